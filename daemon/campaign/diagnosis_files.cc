@@ -17,6 +17,10 @@ json Finite(double value) { return std::isfinite(value) ? json(value) : json(nul
 
 json CauseJson(const sim::CauseFound& cause) {
   json units = cause.all_units ? json("all") : json(cause.units);
+  json posterior = json::object();
+  const std::vector<double> of_candidates = sim::PosteriorOf(cause);
+  for (std::size_t k = 0; k < cause.candidates.size(); ++k)
+    posterior[cause.candidates[k]] = of_candidates[k];
   return {{"cause", cause.cause},
           {"candidates", cause.candidates},
           {"axis", cause.axis},
@@ -24,6 +28,8 @@ json CauseJson(const sim::CauseFound& cause) {
           {"units", units},
           {"amplitude", Finite(cause.amplitude)},
           {"amplitude_unit", cause.amplitude_unit},
+          {"posterior", posterior},
+          {"at_bound", cause.at_bound},
           {"ci95", {Finite(cause.ci95[0]), Finite(cause.ci95[1])}},
           {"rms_um", Finite(cause.size_um)},
           {"delta_log_likelihood", Finite(cause.delta_log_likelihood)},
@@ -176,6 +182,7 @@ json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& names) {
                 {"units", diagnosis.outliers.units},
                 {"why", json(diagnosis.outliers.why)}}},
               {"gain", GainJson(diagnosis.gain)},
+              {"units_by_class", sim::CountByClass(diagnosis.axes)},
               {"data",
                {{"rows", diagnosis.rows},
                 {"units", diagnosis.units},
@@ -214,6 +221,20 @@ std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names
               NumberLine("added_theta_deg", left[u].added_deg[0]) +
               NumberLine("added_phi_deg", left[u].added_deg[1]);
   }
+  return text;
+}
+
+std::string WriteUnitsByClass(const sim::Diagnosis& diagnosis) {
+  std::string text = "unit_id,axis,class,scale_cw,scale_ccw,stalls,stuck_at_deg,wraps,rms_um,moves\n";
+  const auto number = [](std::optional<double> value, int decimals) {
+    return value && std::isfinite(*value) ? fmt::format("{:.{}f}", *value, decimals) : "";
+  };
+  for (const sim::AxisReport& axis : diagnosis.axes)
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", axis.unit_id,
+                        axis.axis == sim::kTheta ? "theta" : "phi", sim::Name(axis.is),
+                        number(axis.scale_cw, 4), number(axis.scale_ccw, 4), axis.stalls,
+                        number(axis.stuck_at_deg, 2), axis.wraps, number(axis.rms_um, 1),
+                        axis.moves);
   return text;
 }
 

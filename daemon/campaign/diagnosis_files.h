@@ -32,6 +32,9 @@ nlohmann::json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& na
 std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names,
                        const sim::Campaign& campaign);
 
+/// units_by_class.csv: a row a unit and axis.
+std::string WriteUnitsByClass(const sim::Diagnosis& diagnosis);
+
 /// The verdict in one sentence, for human readers.
 std::string VerdictSentence(const sim::Diagnosis& diagnosis);
 

@@ -58,6 +58,7 @@ Status WriteReport(const std::filesystem::path& out, const MeasuredCampaign& in,
                                      WriteNextMoves(in.campaign.units, diagnosis.next.moves)));
   FOCALFLEET_TRY(
       WriteFileAtomically(out / "report.html", DiagnosisPage(in.campaign, diagnosis, in.names)));
+  FOCALFLEET_TRY(WriteFileAtomically(out / "units_by_class.csv", WriteUnitsByClass(diagnosis)));
   // report.json is written last: where it exists, all files exist.
   return WriteFileAtomically(out / "report.json",
                              report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
@@ -152,7 +153,7 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
     Say(context, fmt::format("stuck, or off by far more than others and by no cause: unit {}",
                              fmt::join(diagnosis.outliers.units, ", ")));
   if (const std::string patches = PatchTable(diagnosis); !patches.empty()) Say(context, patches);
-  Say(context, options.out + "/{report.json, report.html, model.toml, next_moves.csv}");
+  Say(context, options.out + "/{report.json, report.html, model.toml, next_moves.csv, units_by_class.csv}");
   return ExitCode::kOk;
 }
 
@@ -271,7 +272,7 @@ void AddDiagnoseCommand(CommandLine* line) {
       ->type_name("DIR");
   command
       ->add_option("--out", options->out,
-                   "Folder for report.json, report.html, model.toml, next_moves.csv; required but "
+                   "Folder for report.json, report.html, model.toml, next_moves.csv, units_by_class.csv; required but "
                    "with --against")
       ->type_name("DIR");
   command

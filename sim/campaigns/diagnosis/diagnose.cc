@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <set>
 
@@ -32,8 +33,8 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr std::size_t kMovesMin = 8;  // seen moves of a unit
-// Median; a larger miss means that the geometry is another unit's.
-constexpr double kMissMax_mm = 1;
+// Where more places are beyond the arms' reach, the geometry is another unit's.
+constexpr double kBeyondReachMax = 0.5;  // of the rows
 constexpr double kKeptOfTermMin = 0.03;
 
 // Templates that the data can test; the reasons for the others go to `not_testable`.
@@ -146,11 +147,22 @@ std::string WhyInsufficient(const CampaignFacts& facts, const std::vector<char>&
   return {};
 }
 
-double MedianMiss(const Fit& fit) {
-  std::vector<double> misses;
-  for (std::size_t row = 0; row < fit.weight.size(); ++row)
-    if (fit.weight[row] > 0) misses.push_back(1e-3 * std::hypot(fit.x_um[row], fit.y_um[row]));
-  return misses.empty() ? 0 : Median(std::move(misses));
+// The share of the used rows whose places no pose of the unit reaches.
+double ShareBeyondReach(const Fit& fit) {
+  constexpr double kBeyond_mm = 1;  // more than any geometry is off by
+  const Campaign& campaign = *fit.facts->campaign;
+  double beyond = 0, rows = 0;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const CampaignUnit& by = fit.model.units[unit];
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      if (!fit.Used(row)) continue;
+      const double way_mm = std::hypot(campaign.x_mm[row] - by.base_x_mm,
+                                       campaign.y_mm[row] - by.base_y_mm);
+      rows += 1;
+      beyond += way_mm > by.arm_mm[kTheta] + by.arm_mm[kPhi] + kBeyond_mm ? 1 : 0;
+    }
+  }
+  return rows > 0 ? beyond / rows : 0;
 }
 
 // The part that the given model already explains is no misfit. Its effects are subtracted from the
@@ -276,6 +288,17 @@ void LeaveOutImpossible(const Campaign& given, Diagnosis* diagnosis) {
 
 }  // namespace
 
+std::vector<double> PosteriorOf(const CauseFound& cause) {
+  std::vector<double> weights;
+  for (const std::string& name : cause.candidates) {
+    const auto odds = cause.log_odds.find(name);
+    weights.push_back(odds == cause.log_odds.end() ? 1 : std::exp(odds->second));
+  }
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+  for (double& weight : weights) weight /= sum;
+  return weights;
+}
+
 std::string_view Name(Verdict verdict) {
   switch (verdict) {
     case Verdict::kConsistent:
@@ -308,6 +331,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     TakeAway(before, facts, options.parallel, &campaign);
   }
   diagnosis.model.units = campaign.units;
+  diagnosis.axes = ClassifyAxes(campaign, campaign.units);
   diagnosis.insufficient = WhyInsufficient(facts, aside);
   if (!diagnosis.insufficient.empty()) return diagnosis;
   options.progress(0.02, "static geometry");
@@ -315,13 +339,13 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   diagnosis.causes = UndoExchanges(&campaign, &facts, &as_named);
   SetAside(RowsUnderAnothersName(facts), "at another unit's place", &aside, &diagnosis.outliers);
   Fit fit = StartFit(facts, diagnosis.model, aside, options.parallel);
-  if (MedianMiss(fit) > kMissMax_mm) {
+  if (ShareBeyondReach(fit) > kBeyondReachMax) {
     diagnosis.insufficient =
-        "the places do not belong to these units: half of them are more than " +
-        std::to_string(static_cast<int>(kMissMax_mm)) +
-        " mm from every pose that their geometry allows";
+        "the places do not belong to these units: half of them are more than 1 mm beyond the reach "
+        "of their arms";
     return diagnosis;
   }
+  if (facts.closed.empty()) diagnosis.axes = ClassifyAxes(campaign, fit.model.units);
   diagnosis.x_before_um = fit.x_um, diagnosis.y_before_um = fit.y_um;
   Templates templates = ListLibrary(facts, options, &diagnosis.not_testable);
   SelectionRule rule{.family_wise = options.family_wise, .seed = options.seed};

@@ -16,6 +16,7 @@
 #include "protocol/base/result.h"
 #include "sim/campaigns/campaign/place_steps.h"
 #include "sim/campaigns/diagnosis/ahead.h"
+#include "sim/campaigns/diagnosis/axis_classes.h"
 #include "sim/campaigns/diagnosis/model.h"
 #include "sim/campaigns/effects/registry.h"
 
@@ -38,6 +39,9 @@ struct CauseFound {
   double amplitude = 0;
   std::string amplitude_unit;
   double ci95[2] = {0, 0};
+  bool at_bound = false;  // the amplitude is as large as physics allows
+  // Log odds of candidates against the cause, 0 where the data say nothing of it.
+  std::map<std::string, double> log_odds;
   double size_um = 0;  // rms at the fibre
   double delta_log_likelihood = 0;
   // delta_log_likelihood of each unit, by unit id, in proportion to the squares of what the cause
@@ -47,6 +51,9 @@ struct CauseFound {
   std::string shape;      // of the template, in words
   std::string paragraph;  // for the operator
 };
+
+/// The probability of each candidate, given that the cause is one of them. Shape: (candidates).
+std::vector<double> PosteriorOf(const CauseFound& cause);
 
 /// A cause by its name, which is its only candidate so far.
 inline CauseFound CauseNamed(std::string_view name) {
@@ -112,6 +119,7 @@ struct Diagnosis {
   std::size_t rows = 0, units = 0, moves = 0;
   PlaceSteps steps;
   bool steps_limit = false;          // the steps are wider than the noise
+  std::vector<AxisReport> axes;      // what each axis of each unit is like
   std::vector<std::string> remarks;  // on what is odd in the data (remarks.h)
   CampaignModel model;               // the extended model
   // Ids of units whose fit could not be a unit as the table describes it. The model has the table's

@@ -17,7 +17,7 @@ PoseErrors DoneBy(const ModelTerm& term, const Fit& fit, std::size_t unit) {
   PoseErrors errors;
   errors.Reset(track.moves);
   const std::span<const double> amplitude = term.AmplitudeOf(unit);
-  if (!amplitude.empty()) term.form.effect->apply(track, term.form, amplitude, &errors);
+  if (!amplitude.empty()) AddErrors(track, term.form, amplitude, &errors);
   return errors;
 }
 

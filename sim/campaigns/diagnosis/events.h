@@ -20,7 +20,7 @@ inline constexpr std::string_view kStepLoss = "step_loss", kLostCommand = "lost_
 inline constexpr std::string_view kEvents = "events";
 
 /// Adds the steps that are clear in the residuals to the model. Returns their number.
-std::size_t AddEvents(Fit* fit);
+std::size_t AddEvents(double family_wise, Fit* fit);
 
 /// Whether a neighbour was stopped in the same move, and one of the two not after whole turns.
 bool IsOfContact(const Fit& fit, const EventTerm& event);

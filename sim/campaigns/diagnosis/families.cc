@@ -380,26 +380,14 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
 }
 
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes) {
-  // Pairs of causes that only the missing column separates. Over a night the supply sinks and the
-  // air cools. At one drive level a lag of the load is play, and phases act like the rotor's poles.
-  // At one delay play looks like a creep that is not over, and so do start delays and sags by
-  // unrecorded places. A plate that grows looks like a camera that scales, and one that bends
-  // shifts the image.
-  constexpr std::string_view kAlikeWithoutColumn[][2] = {{"thermal_backlash", "supply_drift"},
-                                                         {"backlash", "load_angle_lag"},
-                                                         {"backlash", "relaxation"},
-                                                         {"backlash", "start_skew"},
-                                                         {"backlash", "supply_droop"},
-                                                         {"phase_imbalance", "cogging"},
-                                                         {"camera_similarity", "plate_expansion"},
-                                                         {"camera_similarity", "gravity_sag"}};
-  for (CauseFound& cause : *causes)
-    for (const NotTestable& other : not_testable)
-      for (const auto& pair : kAlikeWithoutColumn)
-        if (other.why.starts_with("column ") && Has(pair, cause.cause) && Has(pair, other.cause) &&
-            !IsCandidate(cause, other.cause) &&
-            std::ranges::count(cause.cannot_be, other.cause) == 0)
-          cause.candidates.push_back(other.cause);
+  for (const NotTestable& other : not_testable) {
+    const Effect* effect = FindEffect(other.cause);
+    if (effect == nullptr || !other.why.starts_with("column ")) continue;
+    for (CauseFound& cause : *causes)
+      if (std::ranges::count(effect->passes_for, cause.cause) != 0 &&
+          !IsCandidate(cause, other.cause) && std::ranges::count(cause.cannot_be, other.cause) == 0)
+        cause.candidates.push_back(other.cause);
+  }
 }
 
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {

@@ -83,7 +83,8 @@ void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unk
 void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,
                  const RotorCauses& reported, std::vector<CauseFound>* causes);
 
-/// Adds untested causes as candidates where the column is missing that would separate two causes.
+/// Adds untested causes as candidates of the causes that they may pass for without the column that
+/// is missing.
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes);
 
 }  // namespace focalfleet::sim

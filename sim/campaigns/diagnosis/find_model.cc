@@ -38,6 +38,14 @@ bool TryImageFirst(const Templates& templates, const DiagnoseOptions& options,
   return true;
 }
 
+// BIC's price of the shares carried.
+double PriceOfWalk(const Fit& fit) {
+  double shares = 0, values = 0;
+  for (const double share : fit.noise.carry) shares += share > 0 ? 1 : 0;
+  for (std::size_t row = 0; row < fit.weight.size(); ++row) values += fit.Used(row) ? 2 : 0;
+  return shares * std::log(std::max(values, 2.0));
+}
+
 // The terms, steps, zeros of homings and motion of the image that explain the data.
 Selection FindTerms(const Templates& templates, const DiagnoseOptions& options,
                     const SelectionRule& rule, Fit* fit, Diagnosis* diagnosis) {
@@ -67,6 +75,28 @@ Selection FindTerms(const Templates& templates, const DiagnoseOptions& options,
   return selection;
 }
 
+// Explains the data without and, where that pays, with rest errors that moves take along. Such a
+// walk can take the place of most effects: it is a hypothesis beside them, with its price.
+Selection FindTermsOrWalk(const Templates& templates, const DiagnoseOptions& options,
+                          const SelectionRule& rule, Fit* fit, Diagnosis* diagnosis) {
+  constexpr int kRounds = 2;
+  Fit anew = *fit;
+  Diagnosis with_walk = *diagnosis;
+  Selection selection = FindTerms(templates, options, rule, fit, diagnosis);
+  Fit walks = *fit;
+  walks.noise.may_carry = true;
+  SettleFit(&walks, kRounds);
+  const double plain = NegativeBic(*fit);
+  if (NegativeBic(walks) - PriceOfWalk(walks) <= plain) return selection;
+  anew.noise.may_carry = true;
+  SettleFit(&anew, kRounds);
+  Selection again = FindTerms(templates, options, rule, &anew, &with_walk);
+  if (NegativeBic(anew) - PriceOfWalk(anew) <= plain) return selection;
+  *fit = std::move(anew);
+  *diagnosis = std::move(with_walk);
+  return again;
+}
+
 }  // namespace
 
 bool IsLeftOut(const DiagnoseOptions& options, std::string_view cause) {
@@ -85,16 +115,16 @@ double RmsOf(const Fit& fit) {
 Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
                     const SelectionRule& rule, const TrueTemperatures* truth, Fit* fit,
                     Diagnosis* diagnosis) {
-  if (truth == nullptr) return FindTerms(templates, options, rule, fit, diagnosis);
+  if (truth == nullptr) return FindTermsOrWalk(templates, options, rule, fit, diagnosis);
   Diagnosis corrected = *diagnosis;
-  Selection selection = FindTerms(templates, options, rule, fit, diagnosis);
+  Selection selection = FindTermsOrWalk(templates, options, rule, fit, diagnosis);
   const auto cannot = [&](const char* why) {
     diagnosis->not_testable.push_back(
         {std::string(kSensorBias), std::string("sensors are suspect, ") + why});
     return selection;
   };
   Fit by_others = StartFit(truth->facts, corrected.model, fit->aside, options.parallel);
-  Selection again = FindTerms(templates, options, rule, &by_others, &corrected);
+  Selection again = FindTermsOrWalk(templates, options, rule, &by_others, &corrected);
   if (!ReadsTemperature(by_others.model)) return cannot("but nothing goes with the temperature");
   const double better = NegativeBic(by_others) - NegativeBic(*fit);
   if (better < -kUndecided) return selection;

@@ -21,6 +21,7 @@ struct Fit {
   std::vector<double> weight;      // Shape: (rows)
   std::vector<char> aside;         // Shape: (rows): never used in a fit
   Noise noise;
+  GeometryIs geometry_is = GeometryIs::kAnywhere;
   ParallelFor parallel;
 
   [[nodiscard]] bool Used(std::size_t row) const { return weight[row] > 0; }
@@ -37,6 +38,9 @@ struct Fit {
 /// are far off. Errors in the data stay residuals.
 Fit StartFit(const CampaignFacts& facts, CampaignModel model, std::vector<char> aside,
              ParallelFor parallel);
+
+/// Median distance of the used rows from their predicted places.
+double MedianMiss_um(const Fit& fit);
 
 void UpdateResiduals(Fit* fit);
 void UpdateNoise(Fit* fit);    // from the present residuals

@@ -13,31 +13,16 @@ namespace {
 constexpr std::size_t kFolds = 5;
 constexpr double kOutlier = 6;  // whitened length by the final model
 
-// The fold of each row.
+// The fold of each row. Blocks of neighbouring exposures are dealt out in turn. They are short, so
+// that each fold has its share of every condition: of a temperature, of an elevation, of a homing.
 std::vector<std::size_t> FoldsOf(const Fit& fit, std::string* how) {
-  const Campaign& campaign = *fit.facts->campaign;
-  const CampaignFacts& facts = *fit.facts;
-  std::vector<std::size_t> fold(campaign.rows());
-  const std::size_t homings_per_unit =
-      facts.homings / std::max<std::size_t>(campaign.units.size(), 1) + 1;
-  if (homings_per_unit >= kFolds) {
-    *how = "5 folds of whole homings; each fold predicted from the other four";
-    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
-      std::size_t homing = 0;
-      for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
-        if (facts.restarts[row] != 0 && row != campaign.first_row[unit]) ++homing;
-        fold[row] = homing % kFolds;
-      }
-    }
-    return fold;
-  }
-  // Blocks of neighbouring exposures are dealt out in turn, so that no fold is one end of a drift
-  // alone.
+  constexpr std::size_t kBlocksOfFold = 10;  // half or twice as many: the same share of conditions
   *how = "5 folds of blocks of exposures; each fold predicted from the other four";
-  const std::size_t exposures = facts.exposures.size();
-  const std::size_t block = std::max<std::size_t>(1, exposures / (4 * kFolds));
+  const std::size_t exposures = fit.facts->exposures.size();
+  const std::size_t block = std::max<std::size_t>(1, exposures / (kBlocksOfFold * kFolds));
+  std::vector<std::size_t> fold(fit.facts->campaign->rows());
   for (std::size_t row = 0; row < fold.size(); ++row)
-    fold[row] = facts.exposures.of_row[row] / block % kFolds;
+    fold[row] = fit.facts->exposures.of_row[row] / block % kFolds;
   return fold;
 }
 
@@ -115,13 +100,14 @@ bool IsUnderAnother(const Fit& as_named, const Fit& fit, std::size_t row) {
   return std::isfinite(a.x_mm[row]) && (a.x_mm[row] != b.x_mm[row] || a.y_mm[row] != b.y_mm[row]);
 }
 
-// Spread of an angle at one exposure. A part that adds up from move to move counts as after ten
-// moves at most.
+// Variance of a rest error that is new by `spread` in each move, in units of spread^2. A part that
+// adds up from move to move counts as after ten moves at most.
+double SummedVariance(double carry) { return 1 / std::max(1 - carry * carry, 0.1); }
+
+// Spread of an angle at one exposure.
 double AngleSpread(const Noise& noise, std::size_t axis) {
-  const double c2 = noise.carry[axis] * noise.carry[axis];
-  const double summed = 1 / std::max(1 - c2, 0.1);
   return std::sqrt(noise.angle_deg[axis] * noise.angle_deg[axis] +
-                   noise.rest_deg[axis] * noise.rest_deg[axis] * summed);
+                   noise.rest_deg[axis] * noise.rest_deg[axis] * SummedVariance(noise.carry[axis]));
 }
 
 }  // namespace
@@ -129,6 +115,8 @@ double AngleSpread(const Noise& noise, std::size_t axis) {
 double NoiseFloor(const Fit& fit) {
   double sum = 0, count = 0;
   constexpr double kRadians = std::numbers::pi / 180;
+  const double rest2 =
+      fit.noise.rest_um * fit.noise.rest_um * SummedVariance(fit.noise.carry[2]);
   for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
     const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
     const double f2 = fit.noise.unit_factor[unit] * fit.noise.unit_factor[unit];
@@ -141,7 +129,7 @@ double NoiseFloor(const Fit& fit) {
       const double phi_um = 1e3 * kRadians * AngleSpread(fit.noise, 1) *
                             std::hypot(track.reach_x_mm[i], track.reach_y_mm[i]);
       const double place2 = std::max(fit.noise.place_um * fit.noise.place_um, least2 / f2);
-      sum += f2 * (2 * place2 + theta_um * theta_um + phi_um * phi_um);
+      sum += f2 * (2 * (place2 + rest2) + theta_um * theta_um + phi_um * phi_um);
       count += 1;
     }
   }

@@ -61,20 +61,24 @@ void PutDisplacement(const WhiteUnit& white, const PoseErrors& errors, std::size
 }
 
 void WhitenLanes(const WhiteUnit& white, Lanes* rows) {
-  NumberPair theta[kPairs] = {}, phi[kPairs] = {};  // rest errors, estimated from the rows so far
+  // Rest errors, estimated from the rows so far.
+  NumberPair theta[kPairs] = {}, phi[kPairs] = {}, x[kPairs] = {}, y[kPairs] = {};
   const RowFilter* f = white.filter.data();
   const double* t = white.turn_um.data();
   for (std::size_t k = 0; k < white.filter.size(); ++k, ++f, t += 4) {
-    NumberPair* x = PairsOf(rows + 2 * k);
-    NumberPair* y = PairsOf(rows + 2 * k + 1);
+    NumberPair* to_x = PairsOf(rows + 2 * k);
+    NumberPair* to_y = PairsOf(rows + 2 * k + 1);
     for (std::size_t j = 0; j < kPairs; ++j) {
       const NumberPair a = theta[j] * f->keep[0], b = phi[j] * f->keep[1];
-      const NumberPair dx = x[j] - t[0] * a - t[2] * b;
-      const NumberPair dy = y[j] - t[1] * a - t[3] * b;
+      const NumberPair c = x[j] * f->keep[2], d = y[j] * f->keep[2];
+      const NumberPair dx = to_x[j] - t[0] * a - t[2] * b - c;
+      const NumberPair dy = to_y[j] - t[1] * a - t[3] * b - d;
       theta[j] = a + (f->gain[0] * dx + f->gain[1] * dy);
       phi[j] = b + (f->gain[2] * dx + f->gain[3] * dy);
-      x[j] = f->w[0] * dx + f->w[1] * dy;
-      y[j] = f->w[1] * dx + f->w[2] * dy;
+      x[j] = c + (f->gain[4] * dx + f->gain[5] * dy);
+      y[j] = d + (f->gain[6] * dx + f->gain[7] * dy);
+      to_x[j] = f->w[0] * dx + f->w[1] * dy;
+      to_y[j] = f->w[1] * dx + f->w[2] * dy;
     }
   }
 }

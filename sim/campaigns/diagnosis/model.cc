@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "sim/campaigns/effects/closed_loop.h"
 #include "sim/campaigns/effects/empirical.h"
 #include "sim/campaigns/effects/registry.h"
 
@@ -18,7 +19,9 @@ void AddEvents(const CampaignModel& model, std::size_t unit, const UnitTrack& tr
     if (event.unit != unit) continue;
     for (std::size_t i = event.row - track.first_row; i < track.moves; ++i) {
       const bool first = i == event.row - track.first_row;
-      if (!first && (!event.stays || track.restarts[i] != 0)) break;
+      // A loop that was closed begins where the step has brought the axis.
+      const bool closed = !track.facts->closed.empty() && track.facts->closed[track.first_row + i];
+      if (!first && (!event.stays || track.restarts[i] != 0 || closed)) break;
       errors->angle_deg[event.axis][i] += event.step_deg;
     }
   }
@@ -73,27 +76,52 @@ std::string_view Name(Sharing sharing) {
   return "unit";
 }
 
+// Groups differ by more than their errors: each has an amplitude of its own about the mean. The
+// spread between them is that of the moments of their scatter.
+// Source: DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177.
 AmplitudeSummary Summarise(const ModelTerm& term) {
   const std::size_t c = term.form.columns;
-  double mean = 0, square = 0, weight = 0;
+  struct Group {
+    double value = 0;   // of one column; of several their root sum of squares
+    double sigma2 = 0;
+  };
   std::set<std::uint32_t> groups;
   for (const std::uint32_t group : term.group_of_unit)
     if (group != kNoGroup) groups.insert(group);
+  std::vector<Group> own;
   for (const std::uint32_t group : groups) {
-    double s = 0, sigma2 = 0;
+    double square = 0, sigma2 = 0;
     for (std::size_t k = 0; k < c; ++k) {
-      const double a = term.amplitude[group * c + k];
-      s += a * a;
-      sigma2 += term.sigma[group * c + k] * term.sigma[group * c + k] / static_cast<double>(c);
+      const double a = term.amplitude[group * c + k], sigma = term.sigma[group * c + k];
+      square += a * a, sigma2 += sigma * sigma / static_cast<double>(c);
     }
-    const double w = 1 / std::max(sigma2, 1e-30);
-    mean += w * (c == 1 ? term.amplitude[group] : 0);
-    square += w * s, weight += w;
+    // Without an error there is no data.
+    if (sigma2 > 0) own.push_back({c == 1 ? term.amplitude[group] : std::sqrt(square), sigma2});
   }
-  if (!(weight > 0)) return {};
-  const double rms = std::sqrt(square / weight);
-  return {c == 1 && std::abs(mean / weight) > 0.3 * rms ? mean / weight : rms,
-          1 / std::sqrt(weight)};
+  if (own.empty()) return {};
+  const auto mean_of = [&](double between2, const auto& value) {
+    double sum = 0, weight = 0;
+    for (const Group& group : own)
+      sum += value(group) / (group.sigma2 + between2), weight += 1 / (group.sigma2 + between2);
+    return AmplitudeSummary{sum / weight, 1 / std::sqrt(weight)};
+  };
+  const auto itself = [](const Group& group) { return group.value; };
+  const AmplitudeSummary equal = mean_of(0, itself);
+  double scatter = 0, weight = 0, weight2 = 0;
+  for (const Group& group : own) {
+    scatter += std::pow(group.value - equal.value, 2) / group.sigma2;
+    weight += 1 / group.sigma2, weight2 += 1 / (group.sigma2 * group.sigma2);
+  }
+  const double freedom = static_cast<double>(own.size()) - 1;
+  const double between2 =
+      freedom > 0 ? std::max((scatter - freedom) / (weight - weight2 / weight), 0.0) : 0;
+  const AmplitudeSummary mean = mean_of(between2, itself);
+  if (c > 1) return mean;
+  // Groups of either sign have no mean to speak of, and a size.
+  const AmplitudeSummary square =
+      mean_of(between2, [](const Group& group) { return group.value * group.value; });
+  const double rms = std::sqrt(square.value);
+  return {std::abs(mean.value) > 0.3 * rms ? mean.value : rms, mean.sigma};
 }
 
 std::vector<UnitChunk> ChunksOf(std::size_t units) {
@@ -131,9 +159,12 @@ void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack
                    PoseErrors* errors) {
   for (const ModelTerm& term : model.terms) {
     const std::span<const double> amplitude = term.AmplitudeOf(unit);
-    if (!amplitude.empty()) term.form.effect->apply(track, term.form, amplitude, errors);
+    if (!amplitude.empty()) AddErrors(track, term.form, amplitude, errors);
   }
   for (const std::size_t axis : {kTheta, kPhi}) {
+    if (track.beginnings != nullptr)
+      for (std::size_t i = 0; i < track.moves; ++i)
+        errors->angle_deg[axis][i] += track.beginnings->begin_error_deg[axis][i];
     if (model.homing_zero_deg[axis].empty()) continue;
     for (std::size_t i = 0; i < track.moves; ++i)
       errors->angle_deg[axis][i] += model.homing_zero_deg[axis][track.first_row + i];
@@ -143,10 +174,14 @@ void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack
 
 UnitTrack TrackOf(const CampaignModel& model, const CampaignFacts& facts, std::size_t unit) {
   UnitTrack track = MakeTrack(facts, unit, model.units[unit]);
-  if (std::ranges::find(model.events, unit, &EventTerm::unit) == model.events.end()) return track;
+  const bool stepped = std::ranges::find(model.events, unit, &EventTerm::unit) != model.events.end();
+  if (!stepped && !model.large_errors) return track;
   PoseErrors errors;
   errors.Reset(track.moves);
-  AddEvents(model, unit, track, &errors);
+  if (model.large_errors)
+    AddPoseErrors(model, unit, track, &errors);
+  else
+    AddEvents(model, unit, track, &errors);
   TurnPoses({errors.angle_deg[kTheta], errors.angle_deg[kPhi]}, &track);
   return track;
 }

@@ -69,6 +69,8 @@ struct EventTerm {
 struct CampaignModel {
   std::string name = "nominal";
   std::vector<CampaignUnit> units;  // with the fitted geometry
+  // Errors are so large that poses are those predicted, not those commanded.
+  bool large_errors = false;
   std::vector<ModelTerm> terms;
   std::vector<ExposureTerm> exposures;  // empty, or Shape: (exposures)
   std::vector<EventTerm> events;
@@ -110,8 +112,8 @@ struct Places {
   std::vector<double> y_mm;
 };
 
-/// A unit's moves at the poses after its steps. A lost command may be half a turn, and a place
-/// depends differently on the geometry there.
+/// A unit's moves at the poses after its steps, and after all errors where these are large. A lost
+/// command may be half a turn, and a place depends differently on the geometry there.
 UnitTrack TrackOf(const CampaignModel& model, const CampaignFacts& facts, std::size_t unit);
 
 /// The place of every fibre after every move, by the model.

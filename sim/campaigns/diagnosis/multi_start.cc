@@ -18,12 +18,12 @@ double NegativeBicWith(Fit fit, const Noise& noise) {
 // Selects with and without steps in single units' angles, and takes the better fit for its price.
 Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Fit stepped = *fit;
-  const bool has_events = AddEvents(&stepped) > 0;
+  const bool has_events = AddEvents(rule.family_wise, &stepped) > 0;
   Selection selection = Select(templates, rule, fit);
   if (!has_events) return selection;
   // The effect of a cause on a few moves looks like steps until the cause is known.
   Fit explained = *fit;
-  if (AddEvents(&explained) == 0) return selection;
+  if (AddEvents(rule.family_wise, &explained) == 0) return selection;
   Selection again = Select(templates, rule, &stepped);
   // A step is a large claim about one move: it has to be worth more than its price. The same holds
   // for a cause.
@@ -70,7 +70,7 @@ double BetterBy(const Fit& fit, const Fit& than) {
 
 Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Selection selection = SelectWithEvents(templates, rule, fit);
-  if (fit->facts->homings > 0) TryHomings(templates, rule, &selection, fit);
+  if (fit->facts->homings > 0 && fit->facts->closed.empty()) TryHomings(templates, rule, &selection, fit);
   return selection;
 }
 

@@ -31,8 +31,10 @@ std::string ScopeOf(const ModelTerm& term, std::size_t units) {
 CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accepted, double rms_um) {
   const Effect& effect = *term.form.effect;
   CauseFound cause = CauseNamed(effect.cause);
-  for (const Rival& rival : accepted.rivals)
+  for (const Rival& rival : accepted.rivals) {
     (rival.behind_by_likelihood ? cause.behind : cause.candidates).emplace_back(rival.cause);
+    cause.log_odds[std::string(rival.cause)] = std::min(rival.log_odds, 0.0);
+  }
   cause.axis = Name(term.form.axis);
   cause.scope = ScopeOf(term, fit.model.units.size());
   std::size_t have = 0, all = 0;
@@ -51,6 +53,9 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   cause.amplitude = amplitude.value;
   cause.ci95[0] = amplitude.value - 1.96 * amplitude.sigma;
   cause.ci95[1] = amplitude.value + 1.96 * amplitude.sigma;
+  const auto [low, high] = RangeOfAmplitude(effect);
+  cause.at_bound = std::ranges::any_of(
+      term.amplitude, [&](double one) { return one <= low || one >= high; });
   const TermTrace trace = TraceOf(fit, term);
   cause.size_um = trace.rms_um;
   cause.delta_log_likelihood = accepted.evidence.chi_square / 2;

@@ -212,7 +212,7 @@ std::vector<double> Apart(const Fit& ahead, const FleetGroups& groups,
 // ---- Moves that are possible.
 
 // Moves that end in the stance that they begin in: blocks can follow each other in any order.
-struct Block {
+struct MoveBlock {
   std::vector<ProposedMove> moves;
   double seconds = 0;
 };
@@ -233,7 +233,7 @@ double SecondsOf(const std::vector<ProposedMove>& moves) {
   return seconds;
 }
 
-void Add(std::vector<ProposedMove> moves, std::vector<Block>* blocks) {
+void Add(std::vector<ProposedMove> moves, std::vector<MoveBlock>* blocks) {
   const double seconds = SecondsOf(moves);
   blocks->push_back({std::move(moves), seconds});
 }
@@ -261,10 +261,10 @@ std::vector<ProposedMove> LeversOf(const CampaignFacts& facts) {
   return levers;
 }
 
-std::vector<Block> ListBlocks(const CampaignFacts& facts) {
+std::vector<MoveBlock> ListBlocks(const CampaignFacts& facts) {
   constexpr double kSteps_deg[][2] = {{0.15, 0.15}, {0.6, 0.6}, {2.5, 2.5},
                                       {10, 10},     {40, 40},   {140, 80}};
-  std::vector<Block> blocks;
+  std::vector<MoveBlock> blocks;
   for (const ProposedMove& lever : LeversOf(facts))
     for (const auto& step : kSteps_deg)
       for (const double sign : {1.0, -1.0})
@@ -341,7 +341,7 @@ class Chooser {
   }
 
  private:
-  static std::vector<ProposedMove> Joined(std::vector<ProposedMove> moves, const Block& block) {
+  static std::vector<ProposedMove> Joined(std::vector<ProposedMove> moves, const MoveBlock& block) {
     moves.insert(moves.end(), block.moves.begin(), block.moves.end());
     return moves;
   }
@@ -362,7 +362,7 @@ class Chooser {
   void LookAt(const std::vector<std::size_t>& which, const std::vector<ProposedMove>& moves) {
     const double confusion = ConfusionOf(d_);
     fit_.parallel(which.size(), [&](std::size_t k) {
-      const Block& block = blocks_[which[k]];
+      const MoveBlock& block = blocks_[which[k]];
       worth_[which[k]] =
           moves.size() + block.moves.size() > kNextMovesMax
               ? 0
@@ -404,7 +404,7 @@ class Chooser {
   const Ground& ground_;
   const FleetGroups groups_;  // of all units, not only the examined ones
   const std::vector<Pair>& pairs_;
-  std::vector<Block> blocks_;
+  std::vector<MoveBlock> blocks_;
   std::vector<double> worth_;
   std::vector<double> d_, made_;  // from the moves so far; from those already made
 };

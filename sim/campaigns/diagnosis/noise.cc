@@ -15,7 +15,10 @@ namespace {
 
 constexpr double kMedianSquare = 2 * std::numbers::ln2;  // of a whitened 2-D normal residual
 constexpr std::size_t kVarianceRowsMax = 4000;           // rows that the variances come from
-constexpr std::size_t kVarianceRowsMin = 200;            // fewer: one variance only
+
+// Rest errors are expected to be as large as the camera's noise, give or take this factor. Half and
+// twice of it change nothing above some 100 rows: a row says far more than the prior.
+constexpr double kExpectedWithin = 10;
 
 struct NoiseMove {
   bool restarts = false, theta_moves = false, phi_moves = false;
@@ -119,11 +122,6 @@ double CostOf(const NoiseUnit& unit, const Noise& noise) {
   return cost;
 }
 
-double Cost(const std::vector<NoiseUnit>& sample, const Noise& noise) {
-  double cost = 0;
-  for (const NoiseUnit& unit : sample) cost += CostOf(unit, noise);
-  return cost;
-}
 
 double Lever_um(const std::vector<NoiseUnit>& sample, int axis) {
   double most = 0;
@@ -137,48 +135,73 @@ double Lever_um(const std::vector<NoiseUnit>& sample, int axis) {
 class NoiseSearch {
  public:
   NoiseSearch(const std::vector<NoiseUnit>& sample, const Noise& begin)
-      : sample_(sample), best_(begin), cost_(Cost(sample, begin)) {}
-
-  void Place(double widest) {
-    for (double factor = widest; factor > kFine; factor = std::sqrt(factor)) Scale(factor);
+      : sample_(sample), best_(begin) {
+    for (int axis = 0; axis < 2; ++axis) lever_um_[axis] = std::max(Lever_um(sample, axis), 1e-6);
+    cost_ = Cost(begin);
   }
-  void Axes(double widest, bool with_carry) {
+
+  void Search(double widest, bool with_carry) {
     for (double factor = widest; factor > kFine; factor = std::sqrt(factor)) {
       Scale(factor);
-      for (int axis = 0; axis < 2; ++axis) {
-        for (const double f : {factor, 1 / factor}) {
+      for (const double f : {factor, 1 / factor}) {
+        for (int axis = 0; axis < 2; ++axis) {
           Attempt([&](Noise* n) { n->rest_deg[axis] *= f; });
           Attempt([&](Noise* n) { n->angle_deg[axis] *= f; });
         }
-        const double wide = with_carry ? 0.5 * (factor - 1) : 0;
-        for (const double d : {wide, -wide})
-          if (d != 0)
-            Attempt([&](Noise* n) { n->carry[axis] = std::clamp(n->carry[axis] + d, 0.0, 1.0); });
+        Attempt([&](Noise* n) { n->rest_um *= f; });
       }
+      if (!with_carry) continue;
+      const double wide = 0.5 * (factor - 1);
+      for (int part = 0; part < 3; ++part)
+        for (const double d : {wide, -wide})
+          Attempt([&](Noise* n) { n->carry[part] = std::clamp(n->carry[part] + d, 0.0, 1.0); });
     }
   }
   // Tries steps that changes by a factor do not reach.
   void Leaps() {
     for (int axis = 0; axis < 2; ++axis) {
-      const double lever = std::max(Lever_um(sample_, axis), 1e-6);
-      const auto same = [&](double value) { return value * best_.place_um / lever; };
+      const auto same = [&](double share) { return share * best_.place_um / lever_um_[axis]; };
       Attempt([&](Noise* n) { std::swap(n->rest_deg[axis], n->angle_deg[axis]); });
+      Attempt([&](Noise* n) {
+        const double of_axis_um = n->rest_deg[axis] * lever_um_[axis];
+        n->rest_deg[axis] = n->rest_um / lever_um_[axis];
+        n->rest_um = of_axis_um;
+      });
       Attempt([&](Noise* n) { n->carry[axis] = 0; });
       if (best_.rest_deg[axis] < same(0.2))
         for (const double share : {0.3, 1.0})
           Attempt([&](Noise* n) { n->rest_deg[axis] = same(share); });
     }
+    Attempt([&](Noise* n) { n->carry[2] = 0; });
+    if (best_.rest_um < 0.2 * best_.place_um)
+      for (const double share : {0.3, 1.0})
+        Attempt([&](Noise* n) { n->rest_um = share * n->place_um; });
   }
   [[nodiscard]] const Noise& best() const { return best_; }
   [[nodiscard]] double cost() const { return cost_; }
 
  private:
   static constexpr double kFine = 1.015;
+  [[nodiscard]] double Cost(const Noise& noise) const {
+    double cost = 0;
+    for (const NoiseUnit& unit : sample_) cost += CostOf(unit, noise);
+    for (int axis = 0; axis < 2; ++axis)
+      cost += PriorCost(noise.rest_deg[axis] * lever_um_[axis], noise) +
+              PriorCost(noise.angle_deg[axis] * lever_um_[axis], noise);
+    return cost + PriorCost(noise.rest_um, noise);
+  }
+  // A normal prior of the logarithm. A spread below a hundredth of the camera's noise is none.
+  static double PriorCost(double spread_um, const Noise& noise) {
+    const double least = noise.place_um / (kExpectedWithin * kExpectedWithin);
+    const double decades = std::log(std::max(spread_um, least) / noise.place_um) /
+                           std::log(kExpectedWithin);
+    return decades * decades / 2;
+  }
   template <class Change>
   void Attempt(const Change& change) {
     Noise next = best_;
     change(&next);
-    const double cost = Cost(sample_, next);
+    const double cost = Cost(next);
     if (cost < cost_) cost_ = cost, best_ = next;
   }
   void Scale(double factor) {
@@ -186,38 +209,33 @@ class NoiseSearch {
   }
 
   const std::vector<NoiseUnit>& sample_;
+  double lever_um_[2] = {1, 1};
   Noise best_;
-  double cost_;
+  double cost_ = 0;
 };
 
 // A search without a previous result. Errors that are held and errors that are not look alike from
 // far off, so that the search begins at either.
-Noise SearchAnew(const std::vector<NoiseUnit>& sample, bool with_axes, double typical_um,
-                 Noise noise) {
+Noise SearchAnew(const std::vector<NoiseUnit>& sample, double typical_um, Noise noise) {
   noise.place_um = typical_um;
-  for (int axis = 0; axis < 2; ++axis)
-    noise.rest_deg[axis] = noise.angle_deg[axis] = noise.carry[axis] = 0;
-  if (!with_axes) {
-    NoiseSearch search(sample, noise);
-    search.Place(8);
-    return search.best();
-  }
+  std::fill_n(noise.carry, 3, 0.0);
   double least = 0;
   Noise best = noise;
   for (const bool held : {true, false}) {
     Noise begin = noise;
+    begin.rest_um = (held ? 0.5 : 0.01) * typical_um;
     for (int axis = 0; axis < 2; ++axis) {
       const double angle_deg = typical_um / std::max(Lever_um(sample, axis), 1e-6);
       begin.rest_deg[axis] = (held ? 0.5 : 0.01) * angle_deg;
       begin.angle_deg[axis] = (held ? 0.01 : 0.5) * angle_deg;
     }
     NoiseSearch search(sample, begin);
-    search.Axes(4, false);
+    search.Search(4, false);
     if (held || search.cost() < least) least = search.cost(), best = search.best();
   }
   NoiseSearch search(sample, best);
   search.Leaps();
-  search.Axes(2, noise.may_carry);
+  search.Search(2, noise.may_carry);
   return search.best();
 }
 
@@ -229,7 +247,6 @@ void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
         squares.push_back((move.x_um * move.x_um + move.y_um * move.y_um) /
                           (unit.factor * unit.factor));
   if (squares.empty()) return;
-  const bool with_axes = squares.size() >= kVarianceRowsMin;
   const double typical = std::max(std::sqrt(Median(squares) / kMedianSquare), noise->least_um);
   // A previous result that is near makes the search short. Without one, or with one far away, the
   // search is anew.
@@ -237,15 +254,11 @@ void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
       noise->fitted && typical < 2 * noise->typical_um && typical > 0.5 * noise->typical_um;
   if (near) {
     NoiseSearch search(sample, *noise);
-    if (with_axes) {
-      search.Leaps();
-      search.Axes(1.2, noise->may_carry);
-    } else {
-      search.Place(1.2);
-    }
+    search.Leaps();
+    search.Search(1.2, noise->may_carry);
     *noise = search.best();
   } else {
-    *noise = SearchAnew(sample, with_axes, typical, *noise);
+    *noise = SearchAnew(sample, typical, *noise);
   }
   noise->fitted = true;
   noise->typical_um = typical;
@@ -266,10 +279,51 @@ double Shrunk(double own, double n, double usual) {
   return std::sqrt(std::max((n * own + kShrink * usual) / (n + kShrink), 1e-6));
 }
 
+// Errors that all units may have alike in one exposure: of theta, of phi, in x, in y. They are an
+// effect, not noise.
+constexpr Eigen::Index kAlike = 4;
+
+// Of a used row: its whitened place, and what each error alike makes of it.
+struct WhiteRow {
+  std::size_t exposure = 0;
+  Eigen::Vector2d y;
+  Eigen::Matrix<double, 2, kAlike> alike;
+};
 struct UnitLengths {
   std::vector<double> square;  // of the used rows
-  std::vector<std::size_t> exposure;
+  std::vector<WhiteRow> rows;  // the same, divided by the unit's factor
 };
+
+Eigen::Matrix<double, 2, kAlike> AlikeOf(const WhiteUnit& white, std::size_t k) {
+  const double* t = &white.turn_um[4 * k];
+  const double* w = white.filter[k].w;
+  Eigen::Matrix2d root;
+  root << w[0], w[1], w[1], w[2];
+  Eigen::Matrix<double, 2, kAlike> errors;
+  errors << t[0], t[2], 1, 0, t[1], t[3], 0, 1;
+  return root * errors;
+}
+
+// Squared lengths of an exposure's rows without what they have alike, scaled for what the fit of
+// that takes from them.
+std::vector<double> LengthsOf(const std::vector<const WhiteRow*>& rows) {
+  constexpr double kFar = 3;  // whitened length from which a row counts less
+  Eigen::Matrix<double, kAlike, kAlike> normal = Eigen::Matrix<double, kAlike, kAlike>::Zero();
+  Eigen::Matrix<double, kAlike, 1> right = Eigen::Matrix<double, kAlike, 1>::Zero();
+  for (const WhiteRow* row : rows) {
+    const double weight = std::min(1.0, kFar / std::max(row->y.norm(), 1e-6));
+    normal += weight * row->alike.transpose() * row->alike;
+    right += weight * row->alike.transpose() * row->y;
+  }
+  const Eigen::Matrix<double, kAlike, 1> alike =
+      normal.completeOrthogonalDecomposition().solve(right);
+  const double n = 2 * static_cast<double>(rows.size());
+  const double left = n / std::max(n - static_cast<double>(kAlike), 1.0);
+  std::vector<double> squares;
+  for (const WhiteRow* row : rows)
+    squares.push_back((row->y - row->alike * alike).squaredNorm() * left);
+  return squares;
+}
 
 // Factors are about 1; their common part is the fleet's noise. A unit or an exposure without any
 // residual has a factor, too: the least that numbers allow. Half or twice of it decides nothing, as
@@ -288,10 +342,13 @@ void Normalise(Noise* noise) {
   noise->place_um = std::max(noise->place_um * usual, noise->least_um);
   for (int axis = 0; axis < 2; ++axis)
     noise->rest_deg[axis] *= usual, noise->angle_deg[axis] *= usual;
+  noise->rest_um *= usual;
 }
 
 void FitFactors(Fit* fit) {
+  constexpr std::size_t kUnitsMin = 6;  // that an exposure's factor is told from
   const std::size_t units = fit->model.units.size();
+  const bool with_exposures = units >= kUnitsMin;
   std::vector<UnitLengths> lengths(units);
   const std::vector<UnitChunk> chunks = ChunksOf(units);
   fit->parallel(chunks.size(), [&](std::size_t chunk) {
@@ -301,8 +358,11 @@ void FitFactors(Fit* fit) {
       for (std::size_t k = 0; k < white.moves.size(); ++k) {
         const auto at = static_cast<Eigen::Index>(2 * k);
         lengths[unit].square.push_back(white.y.segment<2>(at).squaredNorm() / weights[k]);
-        lengths[unit].exposure.push_back(
-            fit->facts->exposures.of_row[white.track.first_row + white.moves[k]]);
+        if (with_exposures)
+          lengths[unit].rows.push_back(
+              {fit->facts->exposures.of_row[white.track.first_row + white.moves[k]],
+               white.y.segment<2>(at) / std::sqrt(weights[k]),
+               AlikeOf(white, k) / std::sqrt(weights[k])});
       }
     }
   });
@@ -319,18 +379,21 @@ void FitFactors(Fit* fit) {
     const double n = own[unit] < 0 ? 0 : static_cast<double>(lengths[unit].square.size());
     fit->noise.unit_factor[unit] *= Shrunk(std::max(own[unit], 0.0), n, usual);
   }
+  if (!with_exposures) return Normalise(&fit->noise);
   // Exposures get what is left after the units' factors.
-  constexpr std::size_t kUnitsMin = 6;
-  if (units < kUnitsMin) return Normalise(&fit->noise);
-  std::vector<std::vector<double>> of(fit->facts->exposures.size());
+  std::vector<std::vector<const WhiteRow*>> of(fit->facts->exposures.size());
   for (std::size_t unit = 0; unit < units; ++unit)
-    for (std::size_t k = 0; k < lengths[unit].square.size(); ++k)
-      of[lengths[unit].exposure[k]].push_back(lengths[unit].square[k] / std::max(own[unit], 1e-6));
+    for (WhiteRow& row : lengths[unit].rows) {
+      const double factor = std::sqrt(std::max(own[unit], 1e-6));
+      row.y /= factor, row.alike /= factor;
+      of[row.exposure].push_back(&row);
+    }
   std::vector<double>& factor = fit->noise.exposure_factor;
   factor.resize(of.size(), 1);
   for (std::size_t e = 0; e < of.size(); ++e)
     if (!of[e].empty())
-      factor[e] *= Shrunk(Median(of[e]) / kMedianSquare, static_cast<double>(of[e].size()), 1);
+      factor[e] *= Shrunk(Median(LengthsOf(of[e])) / kMedianSquare,
+                          static_cast<double>(of[e].size()), 1);
   Normalise(&fit->noise);
 }
 

@@ -19,10 +19,10 @@ constexpr double kSizeMinUm = 0.05;  // a smaller misfit is not worth a term, ho
 constexpr double kSpreadMaxDeg = 0.3;
 
 bool IsSame(const Template& a, const Template& b) {
-  constexpr double kApart = 0.3;  // orders that are nearer are one ripple, found again
+  constexpr double kNearOrders = 0.3;  // orders that are nearer are one ripple, found again
   return a.effect == b.effect && a.axis == b.axis && a.form == b.form &&
          a.covariate == b.covariate &&
-         (a.effect == &EmpiricalCurve() || std::abs(a.shape - b.shape) < kApart);
+         (a.effect == &EmpiricalCurve() || std::abs(a.shape - b.shape) < kNearOrders);
 }
 
 // The term that shows the structure, with amplitudes for all of its curve.

@@ -25,7 +25,11 @@ double MedianMiss(const std::vector<PlainRow>& rows, const CampaignUnit& unit) {
 // Levenberg-Marquardt with L1-like weights about the median distance.
 CampaignUnit FitPlain(const std::vector<PlainRow>& rows, const CampaignUnit& table,
                       CampaignUnit unit, int rounds) {
-  const StaticVector prior = StaticPriorWeights();
+  std::vector<double> angles_deg[2];
+  for (const PlainRow& row : rows)
+    angles_deg[kTheta].push_back(row.theta_deg), angles_deg[kPhi].push_back(row.phi_deg);
+  const bool moves[2] = {TellsOfItself(angles_deg[kTheta]), TellsOfItself(angles_deg[kPhi])};
+  const StaticVector prior = StaticPriorWeights(GeometryIs::kAnywhere, moves);
   double damping = 1e-3;
   double miss_mm = std::max(MedianMiss(rows, unit), 1e-5);
   for (int round = 0; round < rounds; ++round) {

@@ -53,8 +53,12 @@ Templates ScreenTemplates(const CampaignFacts& facts) {
     if (!column.varies() || name == "sigma_um" || name == "rehomed" || name == "pixel_x" ||
         name == "pixel_y")
       continue;
+    // What is periodic in time may have several periods in a night.
+    constexpr std::size_t kCosinesOfTime = 20;  // ten periods; half as many miss those beyond five
+    const bool is_time = name == "t_s" || name == kOrder;
+    const std::size_t cosines = is_time ? kCosinesOfTime : kEmpiricalCosines;
     for (int channel = 0; channel < kEmpiricalChannels; ++channel)
-      for (std::size_t cosine = 1; cosine <= kEmpiricalCosines; ++cosine)
+      for (std::size_t cosine = 1; cosine <= cosines; ++cosine)
         looks.push_back({.effect = &EmpiricalCurve(),
                          .axis = EffectAxis::kNone,
                          .form = channel,

@@ -173,7 +173,8 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
     const bool alike = share >= rule.rival_share && !hopeless &&
                        AreTogether(templates[k].effect->owner, best.has, groups);
     if (behind >= near && !alike) continue;
-    const Rival rival{cause, behind, share, behind >= kAlike * near};
+    const double log_odds = -behind / 2 * rule.rival_behind / near;
+    const Rival rival{cause, behind, log_odds, share, behind >= kAlike * near};
     const auto [it, fresh] = by_cause.emplace(cause, rival);
     if (!fresh && behind < it->second.behind) it->second = rival;
   }
@@ -206,7 +207,7 @@ void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetG
     if ((std::min(trial.behind, trial.behind_by_likelihood) < rule.rival_behind ||
          trial.beyond_chance) &&
         std::ranges::find(*rivals, trial.cause, &Rival::cause) == rivals->end())
-      rivals->push_back({trial.cause, trial.behind, 0, false});
+      rivals->push_back({trial.cause, trial.behind, -trial.behind / 2, 0, false});
 }
 
 // Looks at each term once: exchanges it, drops it, or keeps its rivals. True if anything changed.

@@ -24,8 +24,7 @@ std::optional<UnknownFound> FindSharedWalk(const Fit& fit, double family_wise, s
   if (std::max(fit.noise.carry[kTheta], fit.noise.carry[kPhi]) < kRemembersShare)
     return std::nullopt;
   Fit forgetful = fit;
-  forgetful.noise = {
-      .least_um = fit.noise.least_um, .may_carry = false, .unit_factor = fit.noise.unit_factor};
+  forgetful.noise = {.least_um = fit.noise.least_um, .unit_factor = fit.noise.unit_factor};
   UpdateNoise(&forgetful);
   UpdateWeights(&forgetful);
   SettleFit(&forgetful, kRounds);

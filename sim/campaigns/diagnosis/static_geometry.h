@@ -55,13 +55,39 @@ inline GeometryCheck CheckGeometry(const CampaignUnit& described, const Campaign
   return check;
 }
 
-/// Weights of a wide prior: what the moves do not show stays as in units.csv. Per mm^2 and
-/// degree^2.
-inline StaticVector StaticPriorWeights() {
+/// How far a fit's geometry may be from the one of units.csv.
+enum class GeometryIs {
+  kAnywhere,   // zeros have any value
+  kNearTable,  // the coordinator has used the table as it is: it is off by little
+};
+
+/// Weights of the prior: what the moves do not show stays as in units.csv. An axis that does not
+/// move tells nothing of its arm and its zero. Per mm^2 and degree^2.
+inline StaticVector StaticPriorWeights(GeometryIs where, const bool (&moves)[2]) {
   constexpr double kBase_mm = 2, kArm_mm = 0.5, kZero_deg = 180;
+  // Play of a base in its hole, scatter of arms and of zeros of a table in use; half and twice of
+  // them change what few moves show.
+  constexpr double kNearBase_mm = 0.1, kNearArm_mm = 0.06, kNearZero_deg = 1;
+  constexpr double kFixed = 1e-6;
+  const bool near = where == GeometryIs::kNearTable;
   StaticVector spread;
-  spread << kBase_mm, kBase_mm, kArm_mm, kArm_mm, kZero_deg, kZero_deg;
+  spread.head<2>().setConstant(near ? kNearBase_mm : kBase_mm);
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    spread[2 + a] = moves[axis] ? (near ? kNearArm_mm : kArm_mm) : kFixed;
+    spread[4 + a] = moves[axis] ? (near ? kNearZero_deg : kZero_deg) : kFixed;
+  }
   return spread.array().square().inverse();
+}
+
+/// Whether an axis moves enough to tell its arm from its zero. Angles in degrees.
+template <class Angles>
+bool TellsOfItself(const Angles& angles_deg) {
+  // A turn by this angle changes an arm of 3 mm by 0.5 um. Half or twice of it: the same axes.
+  constexpr double kLeast_deg = 1;
+  if (std::size(angles_deg) == 0) return false;
+  const auto [low, high] = std::minmax_element(std::begin(angles_deg), std::end(angles_deg));
+  return *high - *low >= kLeast_deg;
 }
 
 }  // namespace focalfleet::sim

@@ -53,7 +53,9 @@ UnitEquations MakeEquations(const Fit& fit, std::size_t unit, const WhiteUnit& w
   UnitEquations eq;
   eq.y = white.y;
   eq.own = white.geometry;
-  eq.prior = StaticPriorWeights();
+  const bool moves[2] = {TellsOfItself(white.track.cmd_deg[kTheta]),
+                         TellsOfItself(white.track.cmd_deg[kPhi])};
+  eq.prior = StaticPriorWeights(fit.geometry_is, moves);
   eq.value = ToVector(fit.model.units[unit]) - ToVector(fit.facts->campaign->units[unit]);
   eq.shared.resize(white.y.size(), 0);
   PoseErrors errors;

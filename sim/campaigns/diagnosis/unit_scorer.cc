@@ -137,7 +137,7 @@ UnitScorer::UnitLook UnitScorer::LookWithout(std::size_t without, std::size_t pl
     const std::span<const double> amplitude = term.AmplitudeOf(unit_);
     if (!amplitude.empty()) {
       errors_.Reset(white_.track.moves);
-      term.form.effect->apply(white_.track, term.form, amplitude, &errors_);
+      AddErrors(white_.track, term.form, amplitude, &errors_);
       WhiteDisplacement(white_, errors_, look.target.data());
       look.y += look.target;
     }

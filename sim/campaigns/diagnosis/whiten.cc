@@ -6,6 +6,7 @@
 #include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/fit.h"
 #include "sim/campaigns/diagnosis/rest_filter.h"
+#include "sim/campaigns/effects/closed_loop.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -73,22 +74,47 @@ void RunFilter(const Fit& fit, std::size_t unit, std::vector<double>* made, Whit
 
 void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>& turn_um,
                  double* xy_um) {
-  double theta = 0, phi = 0;  // rest errors, estimated from the rows so far
+  double theta = 0, phi = 0, x = 0, y = 0;  // rest errors, estimated from the rows so far
   for (std::size_t k = 0; k < filter.size(); ++k) {
     const RowFilter& f = filter[k];
     const double* t = &turn_um[4 * k];
-    theta *= f.keep[0], phi *= f.keep[1];
+    theta *= f.keep[0], phi *= f.keep[1], x *= f.keep[2], y *= f.keep[2];
     double* xy = xy_um + 2 * k;
-    const double dx = xy[0] - t[0] * theta - t[2] * phi;
-    const double dy = xy[1] - t[1] * theta - t[3] * phi;
+    const double dx = xy[0] - t[0] * theta - t[2] * phi - x;
+    const double dy = xy[1] - t[1] * theta - t[3] * phi - y;
     theta += f.gain[0] * dx + f.gain[1] * dy;
     phi += f.gain[2] * dx + f.gain[3] * dy;
+    x += f.gain[4] * dx + f.gain[5] * dy;
+    y += f.gain[6] * dx + f.gain[7] * dy;
     xy[0] = f.w[0] * dx + f.w[1] * dy;
     xy[1] = f.w[1] * dx + f.w[2] * dy;
   }
 }
 
 void WhiteUnit::Apply(double* xy_um) const { ApplyFilter(filter, turn_um, xy_um); }
+
+namespace {
+
+bool IsClosed(const UnitTrack& track, std::size_t move) {
+  return track.beginnings != nullptr && track.restarts[move] == 0 &&
+         track.facts->closed[track.first_row + move] != 0;
+}
+
+// The angles by which a move began off where the coordinator believed, per mm or degree of one
+// number of the geometry, degrees.
+std::array<double, 2> TurnAtBeginning(const UnitTrack& track, std::size_t move, Eigen::Index number) {
+  const UnitTrack& poses = track.beginnings->track;
+  const std::size_t b = 2 * move;
+  const double ex = poses.elbow_x_mm[b], ey = poses.elbow_y_mm[b];
+  const double rx = poses.reach_x_mm[b], ry = poses.reach_y_mm[b];
+  const double arm[2] = {track.unit->arm_mm[0], track.unit->arm_mm[1]};
+  if (number >= 4) return {number == 4 ? 1.0 : 0.0, number == 5 ? 1.0 : 0.0};
+  const double shift[4][2] = {
+      {1, 0}, {0, 1}, {ex / arm[0], ey / arm[0]}, {rx / arm[1], ry / arm[1]}};
+  return AnglesOfShift(ex, ey, rx, ry, shift[number][0], shift[number][1]);
+}
+
+}  // namespace
 
 Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white) {
   const UnitTrack& track = white.track;
@@ -106,6 +132,11 @@ Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white) {
         {t[2], t[3]}};
     const auto at = static_cast<Eigen::Index>(2 * k);
     for (Eigen::Index c = 0; c < 6; ++c) out(at, c) = columns[c][0], out(at + 1, c) = columns[c][1];
+    if (!IsClosed(track, i)) continue;
+    for (Eigen::Index c = 0; c < 6; ++c) {
+      const auto turn = TurnAtBeginning(track, i, c);
+      for (Eigen::Index xy = 0; xy < 2; ++xy) out(at + xy, c) -= t[xy] * turn[0] + t[2 + xy] * turn[1];
+    }
   }
   return out;
 }

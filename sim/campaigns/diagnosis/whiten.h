@@ -1,12 +1,14 @@
 // Whitening turns a unit's residuals into independent numbers of variance one. An axis that has
-// come to rest a little off stays there until it moves again, so that errors of neighbouring
-// exposures are alike. The estimate of the two rest errors from the places before is subtracted
-// from each place (a Kalman filter along the unit's moves). The difference is divided by its
-// spread.
+// come to rest a little off stays there until it moves again, and so does the whole unit, as its
+// carrier tilts. Errors of neighbouring exposures are therefore alike. The estimate of these rest
+// errors from the places before is subtracted from each place (a Kalman filter along the unit's
+// moves). The difference is divided by its spread.
 //
 // Noise of one measured place:
-//   cov = place^2 I + sum over axes of t t' (angle^2 + var(rest)),  t = dplace / dangle,
+//   cov = place^2 I + var(rest of the unit) + sum over axes of t t' (angle^2 + var(rest)),
+//   t = dplace / dangle,
 //   rest <- carry rest + N(0, rest^2) whenever the axis moves, N(0, rest^2) after a homing,
+//   rest of the unit, x and y: the same whenever either axis moves,
 // times factors of the unit and of the exposure. Place times these has a floor, by the rounding of
 // the places (place_steps.h). Rows count less (Huber) where the whitened length is beyond noise;
 // the filter gives them less weight, too.
@@ -28,8 +30,9 @@ struct Noise {
   double least_um = kNoiseLeast_um;     // least own noise of a place, of any unit and exposure
   double angle_deg[2] = {0, 0};         // new at each exposure
   double rest_deg[2] = {0, 0};          // new at each move of the axis, held until the next
-  double carry[2] = {0, 0};             // share of it that the next move takes along, 0..1
-  bool may_carry = true;                // whether the carried share is fitted
+  double rest_um = 0;                   // in x and in y: new at each move of either axis
+  double carry[3] = {0, 0, 0};          // share that the next move takes along, 0..1: axes, unit
+  bool may_carry = false;               // whether the shares carried are fitted
   std::vector<double> unit_factor;      // Shape: (units)
   std::vector<double> exposure_factor;  // Shape: (exposures), or empty: all 1; of place_um
   bool fitted = false;                  // where a new search begins near
@@ -38,11 +41,14 @@ struct Noise {
 
 struct Fit;
 
-/// The whitening of a used row: y = w (r - t'e), e <- keep .* e before and + gain (r - t'e) after.
+/// The rest errors that a filter follows: of theta and phi, degrees; of the place in x and y, um.
+inline constexpr std::size_t kRestErrors = 4;
+
+/// The whitening of a used row: y = w (r - H e), e <- keep .* e before and + gain (r - H e) after.
 struct RowFilter {
-  double w[3];     // symmetric root of the inverse covariance: xx, xy, yy; per um
-  double gain[4];  // of theta by x, y, of phi by x, y; degrees per um
-  double keep[2];  // of the rest errors, since the used row before
+  double w[3];                 // symmetric root of the inverse covariance: xx, xy, yy; per um
+  double gain[2 * kRestErrors];  // of each rest error by x, y
+  double keep[3];              // of theta, phi, place, since the used row before
 };
 
 struct WhiteUnit {

@@ -12,6 +12,7 @@ void List(const CampaignFacts& facts, Templates* out) {
                   .columns = 6,
                   .form = 2,
                   .label = "radial of third and fifth order, decentred, trefoil"});
+  out->push_back({.axis = EffectAxis::kNone, .columns = 8, .form = 3, .label = "any third order"});
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
@@ -21,7 +22,13 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
     const double x = track.fibre_x_mm[i] / facts.radius_mm;
     const double y = track.fibre_y_mm[i] / facts.radius_mm;
     const double r2 = x * x + y * y;
-    if (form.form == 2) {
+    if (form.form == 3) {
+      const double cubes[] = {x * x * x, x * x * y, x * y * y, y * y * y};
+      for (std::size_t k = 0; k < 4; ++k) {
+        errors->x_mm[i] += 1e-3 * amplitude[k] * cubes[k];
+        errors->y_mm[i] += 1e-3 * amplitude[k + 4] * cubes[k];
+      }
+    } else if (form.form == 2) {
       const double* a = amplitude.data();
       const double radial = a[0] * r2 + a[1] * r2 * r2;
       errors->x_mm[i] += 1e-3 * (radial * x + a[2] * (r2 + 2 * x * x) + a[3] * 2 * x * y +

@@ -22,7 +22,7 @@ void List(const CampaignFacts& facts, Templates* out) {
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   for (std::size_t i = 0; i < track.moves; ++i) {
-    const std::size_t exposure = track.facts->exposures.of_row[track.first_row + i];
+    const std::size_t exposure = track.facts->exposures.of_row[track.RowOf(i)];
     if (static_cast<double>(exposure) < form.shape) continue;
     errors->x_mm[i] += 1e-3 * amplitude[0];
     errors->y_mm[i] += 1e-3 * amplitude[1];

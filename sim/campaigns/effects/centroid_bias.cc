@@ -10,18 +10,23 @@ namespace {
 void List(const CampaignFacts& facts, Templates* out) {
   (void)facts;
   out->push_back({.axis = EffectAxis::kNone, .columns = 2, .label = "period of one pixel"});
+  out->push_back({.axis = EffectAxis::kNone,
+                  .columns = 4,
+                  .form = 1,
+                  .label = "period of one pixel, other in y than in x"});
 }
 
-void Apply(const UnitTrack& track, const Template&, std::span<const double> amplitude,
+void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   constexpr double kTurn = 2 * std::numbers::pi;
   const std::span<const double> x = track.Column("pixel_x");
   const std::span<const double> y = track.Column("pixel_y");
+  const std::span<const double> in_y = form.form == 1 ? amplitude.subspan(2) : amplitude;
   for (std::size_t i = 0; i < track.moves; ++i) {
     errors->x_mm[i] +=
         1e-3 * (amplitude[0] * std::sin(kTurn * x[i]) + amplitude[1] * std::cos(kTurn * x[i]));
     errors->y_mm[i] +=
-        1e-3 * (amplitude[0] * std::sin(kTurn * y[i]) + amplitude[1] * std::cos(kTurn * y[i]));
+        1e-3 * (in_y[0] * std::sin(kTurn * y[i]) + in_y[1] * std::cos(kTurn * y[i]));
   }
 }
 

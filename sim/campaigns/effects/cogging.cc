@@ -46,7 +46,9 @@ Effect MakeCogging() {
               "with the motor's own order that falls with the drive level. A stronger hold at "
               "the end of the move removes it.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          // At one drive level the pull of the poles is a ripple like that of the phases.
+          .passes_for = {"phase_imbalance"}};
 }
 
 }  // namespace focalfleet::sim

@@ -28,7 +28,7 @@ constexpr std::array kForms = {
 std::vector<double> ShapesOf(Step step) {
   if (step == Step::kMotorTurns) return {1, 4, 24, 96};
   if (step == Step::kBits) return {9, 10, 11, 12, 13, 14};
-  return {0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2};
+  return {0.00125, 0.0025, 0.005, 0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2};
 }
 
 double Step_deg(const Form& form, double shape, double gear) {

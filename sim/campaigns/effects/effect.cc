@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "sim/campaigns/effects/closed_loop.h"
+
 namespace focalfleet::sim {
 
 void PoseErrors::Reset(std::size_t moves) {
@@ -91,12 +93,23 @@ bool CanBe(const Template& form, double amplitude, double sigmas) {
          std::abs(amplitude) >= least - sigmas;
 }
 
+void AddErrors(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+               PoseErrors* errors) {
+  // Tables are of what a row shows, whichever loop it had.
+  if (track.beginnings == nullptr || form.table != nullptr)
+    return form.effect->apply(track, form, amplitude, errors);
+  PoseErrors along;
+  along.Reset(track.beginnings->track.moves);
+  form.effect->apply(track.beginnings->track, form, amplitude, &along);
+  AddDifferences(track, along, errors);
+}
+
 void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,
                  PoseErrors* errors) {
   double amplitudes[kColumnsMax] = {};
   amplitudes[column] = amplitude;
   errors->Reset(track.moves);
-  form.effect->apply(track, form, std::span(amplitudes).first(form.columns), errors);
+  AddErrors(track, form, std::span(amplitudes).first(form.columns), errors);
 }
 
 std::size_t AxisIndex(const Template& form) {

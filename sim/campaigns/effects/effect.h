@@ -48,7 +48,7 @@ enum class Memory {
   kChain,  // adds up, open loop, until the unit is homed
 };
 
-inline constexpr std::size_t kColumnsMax = 6;
+inline constexpr std::size_t kColumnsMax = 8;
 
 struct Effect;
 
@@ -113,6 +113,8 @@ struct Effect {
   bool amplitude_is_shape = false;
   // Whether the moves can distinguish this shape. nullptr: any moves can.
   bool (*shows)(const Template&, const CampaignFacts&) = nullptr;
+  // Causes whose trace this one may pass for where one of `needs` is missing from the campaign.
+  std::vector<std::string_view> passes_for = {};
 };
 
 /// Whether these moves can distinguish the effect's own shape.
@@ -126,6 +128,11 @@ struct AmplitudeRange {
 AmplitudeRange RangeOfAmplitude(const Effect& effect);
 /// Whether the template can have an amplitude within some sigmas of this one. Pre: one column.
 bool CanBe(const Template& form, double amplitude, double sigmas);
+
+/// Adds the template's errors at these amplitudes, by the loop that was closed or open
+/// (closed_loop.h). Shape: amplitude (columns).
+void AddErrors(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+               PoseErrors* errors);
 
 /// Sets `errors` to those of one column at the given amplitude, with the other amplitudes at 0.
 void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,
@@ -174,7 +181,7 @@ void AddRemembered(const UnitTrack& track, std::size_t moving_axis, Memory memor
     if (track.step_deg[moving_axis][i] != 0) {
       const double value = made(i);
       state = memory == Memory::kChain ? state + value : value;
-    } else if (memory == Memory::kNow) {
+    } else if (memory == Memory::kNow && !track.IsBeginning(i)) {
       state = 0;
     }
     (*angle_deg)[i] += state;

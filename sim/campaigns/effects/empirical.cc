@@ -30,7 +30,7 @@ std::vector<double> RanksOf(const UnitTrack& track, const Template& form) {
   const FilledColumn& column = *track.facts->Find(form.covariate);
   std::vector<double> ranks(track.moves);
   for (std::size_t i = 0; i < track.moves; ++i) {
-    const std::size_t row = track.first_row + i;
+    const std::size_t row = track.RowOf(i);
     ranks[i] =
         form.knots.empty() ? double{column.rank[row]} : RankAt(form.knots, column.values[row]);
   }
@@ -176,7 +176,8 @@ Template WholeCurve(const Template& look, const CampaignFacts& facts) {
   curve.knots = KnotsOf(*facts.Find(look.covariate));
   // The column's values can distinguish so many cosines, without the constant.
   curve.columns = std::clamp<std::size_t>(curve.knots.size() - 1, 1, kEmpiricalCosines);
-  curve.shape = 1;
+  // A look beyond the slowest cosines has the middle of them.
+  curve.shape = std::max(1.0, look.shape - static_cast<double>(kEmpiricalCosines / 2));
   curve.label = "smooth curve over the ranks of " + look.covariate;
   return curve;
 }

@@ -32,7 +32,7 @@ Effect MakeGearScale() {
               "ratio, and look at the gear if one unit stands out.",
           .list = List,
           .apply = Apply,
-          .amplitude_low = -0.5,
+          .amplitude_low = -1,  // an axis that stands still
           .amplitude_high = 0.5};
 }
 

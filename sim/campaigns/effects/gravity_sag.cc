@@ -37,7 +37,9 @@ Effect MakeGravitySag() {
               "The plate or the camera's mount sinks under gravity: all fibres shift the same "
               "way, in proportion to gravity's part along the plate.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          // Without elevations a plate that sags is a shift of the image.
+          .passes_for = {"camera_similarity"}};
 }
 
 }  // namespace focalfleet::sim

@@ -55,7 +55,9 @@ Effect MakeGravityTorque() {
               "the zenith.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          // At one elevation the side of the gears goes with the angle alone.
+          .passes_for = {"eccentricity"}};
 }
 
 }  // namespace focalfleet::sim

@@ -12,17 +12,26 @@ void List(const CampaignFacts&, Templates* out) {
   ListGrid({.shapes = begins_deg, .shape_name = "upper end; begins before it by, deg,"}, out);
   ListGrid({.shapes = begins_deg, .shape_name = "lower end; begins before it by, deg,", .form = 1},
            out);
+  // The motor runs on against the stop, and is out of step until the unit is homed.
+  ListGrid({.shapes = begins_deg, .shape_name = "upper end; slips from, deg before it,", .form = 2},
+           out);
+  ListGrid({.shapes = begins_deg, .shape_name = "lower end; slips from, deg before it,", .form = 3},
+           out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const CampaignUnit& unit = *track.unit;
+  const bool upper = form.form == 0 || form.form == 2, slips = form.form >= 2;
+  double lost_deg = 0;
   for (std::size_t i = 0; i < track.moves; ++i) {
-    const double q = track.cmd_deg[axis][i];
-    const double beyond_deg = form.form == 0 ? -std::max(q - (unit.max_deg[axis] - form.shape), 0.0)
+    if (track.restarts[i]) lost_deg = 0;
+    const double q = track.cmd_deg[axis][i] + lost_deg;
+    const double beyond_deg = upper ? -std::max(q - (unit.max_deg[axis] - form.shape), 0.0)
                                              : std::max(unit.min_deg[axis] + form.shape - q, 0.0);
-    errors->angle_deg[axis][i] += amplitude[0] * beyond_deg;
+    if (slips) lost_deg += beyond_deg;
+    errors->angle_deg[axis][i] += amplitude[0] * (slips ? lost_deg : beyond_deg);
   }
 }
 

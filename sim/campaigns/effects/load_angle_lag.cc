@@ -59,7 +59,9 @@ Effect MakeLoadAngleLag() {
           .list = List,
           .apply = Apply,
           .continuous_shape = true,
-          .shows = Shows};
+          .shows = Shows,
+          // At one drive level a lag is play.
+          .passes_for = {"backlash"}};
 }
 
 }  // namespace focalfleet::sim

@@ -46,7 +46,9 @@ Effect MakePlateExpansion() {
               "it.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          // Without temperatures a plate that grows is a camera that scales.
+          .passes_for = {"camera_similarity"}};
 }
 
 }  // namespace focalfleet::sim

@@ -84,7 +84,9 @@ Effect MakeRelaxation() {
           .list = List,
           .apply = Apply,
           .continuous_shape = true,
-          .shows = Shows};
+          .shows = Shows,
+          // At one delay a creep that is not over is play.
+          .passes_for = {"backlash"}};
 }
 
 }  // namespace focalfleet::sim

@@ -11,6 +11,7 @@ enum Form {
   kStraight,       // the missing way grows with the slot, from a share of the slots on
   kStraightEarly,  // the same, in exposures that do not wait for the end of a move
   kBraking,        // a unit that is cut off while braking misses little: its speed falls to nothing
+  kRace,           // the missing way grows with the time by which the start comes after the delay
 };
 
 void List(const CampaignFacts& facts, Templates* out) {
@@ -35,11 +36,20 @@ void List(const CampaignFacts& facts, Templates* out) {
               .shape_name = "in exposures within a second; from this share of the slots:",
               .form = kStraightEarly},
              out);
+  // The last unit of the bus starts so late. An exposure that waits longer sees its whole move.
+  if (facts.Has("delay_s"))
+    ListGrid({.axes = axes,
+              .memories = {Memory::kNow},
+              .shapes = {0.3, 0.6, 1.2, 2.5, 5},
+              .shape_name = "the exposure does not wait; the last unit starts after, s,",
+              .form = kRace},
+             out);
 }
 
 // Slots are shares from 0 to 1. A skew that begins below 0 is a play for all units, and two of them
 // cancel.
-bool Shows(const Template& form, const CampaignFacts&) {
+bool Shows(const Template& form, const CampaignFacts& facts) {
+  if (form.form == kRace) return form.shape > std::max(facts.Find("delay_s")->low, 0.0);
   if (form.form == kBraking) return form.shape > 0 && form.shape <= 1;
   return form.shape >= 0 && form.shape < 1;
 }
@@ -58,13 +68,17 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const std::span<const double> slot = track.Column("bus_slot");
   const double last = std::max(track.facts->Find("bus_slot")->high, 1.0);
   std::span<const double> delay;
-  if (form.form == kStraightEarly) delay = track.Column("delay_s");
+  if (form.form == kStraightEarly || form.form == kRace) delay = track.Column("delay_s");
   for (const std::size_t axis : AxesOf(form)) {
     const std::span<const double> step = track.step_deg[axis];
     AddRemembered(
         track, axis, form.memory,
         [&](std::size_t i) {
           if (form.form == kStraightEarly && delay[i] > kEarly_s) return 0.0;
+          if (form.form == kRace) {
+            const double late = std::max(slot[i] / last - delay[i] / form.shape, 0.0);
+            return -Direction(step[i]) * amplitude[0] * late;
+          }
           const double missing = form.form == kBraking
                                      ? MissingOfBraking((slot[i] + 1) / (last + 1), form.shape)
                                      : std::max(slot[i] / last - form.shape, 0.0);
@@ -89,7 +103,9 @@ Effect MakeStartSkew() {
           .list = List,
           .apply = Apply,
           .continuous_shape = true,
-          .shows = Shows};
+          .shows = Shows,
+          // Without places in the order a late start is play.
+          .passes_for = {"backlash"}};
 }
 
 }  // namespace focalfleet::sim

@@ -10,7 +10,8 @@ namespace {
 constexpr double kStays = 0.15;  // share of the wind-up at which the arm breaks loose
 
 void List(const CampaignFacts&, Templates* out) {
-  constexpr double kThresholds_deg[] = {0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2};
+  constexpr double kThresholds_deg[] = {0.05, 0.07, 0.1,  0.14, 0.2, 0.28, 0.4,
+                                        0.57, 0.8,  1.13, 1.6,  2.3, 3.2};
   ListGrid({.memories = {Memory::kNow, Memory::kHold, Memory::kChain},
             .shapes = {std::begin(kThresholds_deg), std::end(kThresholds_deg)},
             .shape_name = "below, deg,"},

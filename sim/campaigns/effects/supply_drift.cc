@@ -54,7 +54,9 @@ Effect MakeSupplyDrift() {
               "The supply (a battery, a warm regulator) sinks while the campaign runs, and "
               "the lag of all units grows with it. Log and regulate the voltage.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          // Over a night the air cools as the supply sinks.
+          .passes_for = {"thermal_backlash"}};
 }
 
 }  // namespace focalfleet::sim

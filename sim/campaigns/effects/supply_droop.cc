@@ -142,7 +142,9 @@ Effect MakeSupplyDroop() {
               "feed the rail at both ends.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          // Without counts of the movers a sag is play.
+          .passes_for = {"backlash"}};
 }
 
 }  // namespace focalfleet::sim

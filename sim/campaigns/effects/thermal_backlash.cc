@@ -55,7 +55,9 @@ Effect MakeThermalBacklash() {
               "temperature, so that the error after a reversal does. Approach from one side, "
               "or compensate by the measured temperature.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          // Over a night the supply sinks as the air cools.
+          .passes_for = {"supply_drift"}};
 }
 
 }  // namespace focalfleet::sim

@@ -8,6 +8,7 @@
 
 #include "protocol/base/units.h"
 #include "sim/campaigns/effects/arm_gap.h"
+#include "sim/campaigns/effects/closed_loop.h"
 #include "sim/campaigns/effects/harness.h"
 
 namespace focalfleet::sim {
@@ -141,6 +142,12 @@ void FindHistory(const Campaign& campaign, CampaignFacts* facts) {
     if (first == campaign.first_row[unit + 1]) continue;
     if (facts->restarts[first] != 0) --facts->homings;
     facts->restarts[first] = 1;
+  }
+  const std::span<const double> measured = campaign.Find("from_measured");
+  for (std::size_t row = 0; row < measured.size(); ++row) {
+    if (!(measured[row] > 0.5)) continue;
+    facts->closed.resize(rows, 0);
+    facts->closed[row] = 1;
   }
   for (const std::size_t axis : {kTheta, kPhi}) {
     facts->step_deg[axis].resize(rows);
@@ -354,7 +361,22 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
   return facts;
 }
 
+std::size_t UnitTrack::RowOf(std::size_t move) const {
+  return of_beginnings == nullptr ? first_row + move : of_beginnings->row[move];
+}
+
+bool UnitTrack::IsBeginning(std::size_t move) const {
+  return of_beginnings != nullptr && move % 2 == 0;
+}
+
 std::span<const double> UnitTrack::Column(std::string_view name) const {
+  if (of_beginnings != nullptr) {
+    const auto [made, fresh] = of_beginnings->columns.try_emplace(std::string(name));
+    if (fresh)
+      for (const std::size_t row : of_beginnings->row)
+        made->second.push_back(facts->Find(name)->values[row]);
+    return made->second;
+  }
   return std::span<const double>(facts->Find(name)->values).subspan(first_row, moves);
 }
 
@@ -391,6 +413,7 @@ UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const Campaign
   UnitTrack track;
   track.facts = &facts;
   track.unit = &geometry;
+  track.unit_index = unit;
   track.first_row = campaign.first_row[unit];
   track.moves = campaign.first_row[unit + 1] - track.first_row;
   for (const std::size_t axis : {kTheta, kPhi}) {
@@ -399,10 +422,15 @@ UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const Campaign
     track.step_deg[axis] = std::span(facts.step_deg[axis]).subspan(track.first_row, track.moves);
   }
   track.restarts = std::span(facts.restarts).subspan(track.first_row, track.moves);
-  SizePoses(&track);
-  for (std::size_t i = 0; i < track.moves; ++i)
-    TakePose(track.cmd_deg[kTheta][i], track.cmd_deg[kPhi][i], i, &track);
+  TakePoses(&track);
+  if (!facts.closed.empty()) track.beginnings = MakeBegunTrack(track);
   return track;
+}
+
+void TakePoses(UnitTrack* track) {
+  SizePoses(track);
+  for (std::size_t i = 0; i < track->moves; ++i)
+    TakePose(track->cmd_deg[kTheta][i], track->cmd_deg[kPhi][i], i, track);
 }
 
 void TurnPoses(const std::span<const double> (&off_deg)[2], UnitTrack* track) {

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -51,6 +52,8 @@ struct CampaignFacts {
   Exposures exposures;
   std::map<std::string, FilledColumn, std::less<>> columns;
   std::vector<char> restarts;       // Shape: (rows): the unit's history begins anew here
+  // Shape: (rows), or empty where no row is: the loop was closed before the move (closed_loop.h).
+  std::vector<char> closed;
   std::vector<double> step_deg[2];  // Shape: (rows): as commanded, wraps of whole turns undone
   double radius_mm = 0;     // of the plate: farthest base from the frame's origin; at least 1
   double pitch_mm = 0;      // median distance to the nearest base; 0 with one unit
@@ -63,9 +66,12 @@ struct CampaignFacts {
 /// Pre: the campaign is valid and outlives the facts.
 CampaignFacts MakeFacts(const Campaign& campaign);
 
+struct BegunTrack;
+
 struct UnitTrack {
   const CampaignFacts* facts = nullptr;
   const CampaignUnit* unit = nullptr;  // with the geometry in use
+  std::size_t unit_index = 0;          // in the campaign
   std::size_t first_row = 0;
   std::size_t moves = 0;
   std::span<const double> cmd_deg[2];
@@ -77,6 +83,15 @@ struct UnitTrack {
   std::vector<double> elbow_x_mm, elbow_y_mm, reach_x_mm, reach_y_mm;
   std::vector<double> fibre_x_mm, fibre_y_mm;  // on the plate
 
+  /// The same moves with their beginnings. nullptr where no loop was closed (closed_loop.h).
+  std::shared_ptr<const BegunTrack> beginnings;
+  /// Set in the track of beginnings alone.
+  BegunTrack* of_beginnings = nullptr;
+
+  /// The campaign's row of a move; of a beginning the row of the exposure that it was seen in.
+  [[nodiscard]] std::size_t RowOf(std::size_t move) const;
+  /// Whether the move is a beginning: nothing happens between the exposure before and it.
+  [[nodiscard]] bool IsBeginning(std::size_t move) const;
   /// Values of a column for this unit's moves. Pre: facts->Has(name).
   [[nodiscard]] std::span<const double> Column(std::string_view name) const;
 };
@@ -86,6 +101,9 @@ std::size_t EndOfHistory(const UnitTrack& track, std::size_t move);
 
 /// `geometry` is the unit with the geometry to use; its arrays are read as long as the track lives.
 UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const CampaignUnit& geometry);
+
+/// Sets the poses to those commanded.
+void TakePoses(UnitTrack* track);
 
 /// Sets the poses of axes that are off their commanded angles by these. Shapes: (moves).
 void TurnPoses(const std::span<const double> (&off_deg)[2], UnitTrack* track);

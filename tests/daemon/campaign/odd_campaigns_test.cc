@@ -8,6 +8,8 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -208,6 +210,45 @@ std::vector<std::string> NoNumbersIn(const std::string& text) {
   return found;
 }
 
+// Each cause shares a probability of 1 out among its candidates, and nothing else.
+void ExpectPosteriors(const nlohmann::json& causes) {
+  for (const nlohmann::json& cause : causes) {
+    double sum = 0;
+    EXPECT_EQ(cause["posterior"].size(), cause["candidates"].size()) << cause;
+    for (const nlohmann::json& candidate : cause["candidates"]) {
+      const std::string name = candidate;
+      ASSERT_TRUE(cause["posterior"].contains(name)) << cause;
+      const double probability = cause["posterior"][name];
+      EXPECT_GE(probability, 0) << cause;
+      sum += probability;
+    }
+    EXPECT_NEAR(sum, 1, 1e-9) << cause;
+    EXPECT_TRUE(cause["at_bound"].is_boolean()) << cause;
+  }
+}
+
+// The table has each axis of each unit once, and the report counts them all.
+void ExpectUnitsByClass(const Campaign& campaign, const std::string& table,
+                        const nlohmann::json& counts) {
+  std::istringstream lines(table);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "unit_id,axis,class,scale_cw,scale_ccw,stalls,stuck_at_deg,wraps,rms_um,moves");
+  std::map<std::string, int> counted;
+  for (const sim::CampaignUnit& unit : campaign.units)
+    for (const char* axis : {"theta", "phi"}) {
+      ASSERT_TRUE(std::getline(lines, line)) << unit.id;
+      EXPECT_THAT(line, ::testing::StartsWith(std::to_string(unit.id) + "," + axis + ","));
+      EXPECT_EQ(std::ranges::count(line, ','), 9) << line;
+      std::istringstream cells(line);
+      std::string cell;
+      for (int k = 0; k < 3; ++k) std::getline(cells, cell, ',');
+      ++counted[cell];
+    }
+  EXPECT_FALSE(std::getline(lines, line)) << line;
+  EXPECT_EQ(counts, nlohmann::json(counted));
+}
+
 class OddCampaign : public testing::TestWithParam<Odd> {};
 
 TEST_P(OddCampaign, IsDiagnosedInNumbers) {
@@ -221,6 +262,10 @@ TEST_P(OddCampaign, IsDiagnosedInNumbers) {
   EXPECT_THAT(NoNumbersIn(WriteNextMoves(campaign.units, diagnosis.next.moves)), IsEmpty());
   const nlohmann::json report = ReportJson(diagnosis, names);
   EXPECT_THAT(NoNumbersIn(report.dump()), IsEmpty());
+  ExpectPosteriors(report["causes"]);
+  const std::string by_class = WriteUnitsByClass(diagnosis);
+  EXPECT_THAT(NoNumbersIn(by_class), IsEmpty());
+  ExpectUnitsByClass(campaign, by_class, report["units_by_class"]);
   for (const nlohmann::json& cause : report["causes"])
     for (const char* number : {"amplitude", "rms_um", "delta_log_likelihood", "predicted_gain_um"})
       EXPECT_TRUE(cause[number].is_number()) << cause;

@@ -1,0 +1,251 @@
+// Robots are simulated axis by axis, and their classes read from the places alone.
+#include "sim/campaigns/diagnosis/axis_classes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "protocol/base/rng.h"
+#include "tests/support/seed.h"
+
+namespace focalfleet::sim {
+namespace {
+
+using focalfleet::test::TestSeed;
+using ::testing::ElementsAre;
+using ::testing::Pair;
+
+constexpr std::size_t kMoves = 60;
+constexpr double kNoise_mm = 0.003;
+
+// An axis as it turns: the shares of a command that it makes, and when it makes none of it.
+struct PlantedAxis {
+  AxisClass is = AxisClass::kHealthy;
+  double scale_cw = 1, scale_ccw = 1;
+  double stall_share = 0;
+  double begins_deg = 90;
+  bool sticks = false;     // at begins_deg
+  bool wraps = false;      // a whole turn more, to and fro
+  bool is_parked = false;  // is never commanded
+};
+
+struct Robot {
+  PlantedAxis axis[2];
+  std::size_t stalls[2] = {0, 0};  // that were made, for the test
+};
+
+CampaignUnit Unit(std::uint32_t id) {
+  CampaignUnit unit{.id = id, .base_x_mm = 20.0 * id, .base_y_mm = 5};
+  unit.arm_mm[kTheta] = unit.arm_mm[kPhi] = 3;
+  unit.zero_deg[kTheta] = 40, unit.zero_deg[kPhi] = -5;
+  unit.gear[kTheta] = unit.gear[kPhi] = 337;
+  unit.min_deg[kTheta] = -190, unit.max_deg[kTheta] = 190;
+  unit.min_deg[kPhi] = 0, unit.max_deg[kPhi] = 180;
+  return unit;
+}
+
+// A target that is at least 12 degrees away, by which a move is long.
+double NextTarget(std::size_t axis, double from_deg, Rng* rng) {
+  for (;;) {
+    const double target = axis == kTheta ? rng->Uniform(-80, 80) : rng->Uniform(35, 145);
+    if (std::abs(target - from_deg) > 12) return target;
+  }
+}
+
+// How far the axis turns when this is asked of it. The first move is never stalled.
+double TurnOf(const PlantedAxis& axis, double asked_deg, std::size_t move, std::size_t* stalls,
+              Rng* rng) {
+  if (axis.sticks || asked_deg == 0) return 0;
+  if (move > 0 && rng->Uniform() < axis.stall_share) {
+    ++*stalls;
+    return 0;
+  }
+  const double made = asked_deg * (asked_deg < 0 ? axis.scale_cw : axis.scale_ccw);
+  return axis.wraps ? made + (move % 2 == 0 ? 360 : -360) : made;
+}
+
+// In a closed loop moves begin where the camera saw the axis, by noise of a few hundredths of a
+// degree; in an open loop where the one before was to end.
+void AddMoves(bool closed, Robot* robot, Rng* rng, Campaign* campaign) {
+  const CampaignUnit& unit = campaign->units[campaign->first_row.size() - 1];
+  double at_deg[2], cmd_deg[2];
+  for (const std::size_t axis : {kTheta, kPhi})
+    at_deg[axis] = cmd_deg[axis] = robot->axis[axis].begins_deg;
+  for (std::size_t move = 0; move < kMoves; ++move) {
+    campaign->move_id.push_back(static_cast<std::int64_t>(move) + 1);
+    for (const std::size_t axis : {kTheta, kPhi}) {
+      const PlantedAxis& planted = robot->axis[axis];
+      const double from = closed ? at_deg[axis] + 0.03 * rng->Normal() : cmd_deg[axis];
+      // Turns of theta count on: the target is meant in the turn that the axis is in.
+      const double turns = axis == kTheta ? 360 * std::round(from / 360) : 0;
+      const double target = turns + NextTarget(axis, from - turns, rng);
+      cmd_deg[axis] = planted.is_parked ? from : target;
+      campaign->from_deg[axis].push_back(from);
+      campaign->cmd_deg[axis].push_back(cmd_deg[axis]);
+      at_deg[axis] += TurnOf(planted, cmd_deg[axis] - from, move, &robot->stalls[axis], rng);
+    }
+    const PlacePoint at = PlaceOf(unit, at_deg[kTheta], at_deg[kPhi]);
+    campaign->x_mm.push_back(at.x_mm + kNoise_mm * rng->Normal());
+    campaign->y_mm.push_back(at.y_mm + kNoise_mm * rng->Normal());
+  }
+  campaign->first_row.push_back(campaign->rows());
+}
+
+Campaign CampaignOf(std::uint64_t seed, bool closed, std::vector<Robot>* robots) {
+  Campaign campaign{.first_row = {0}};
+  for (std::size_t k = 0; k < robots->size(); ++k)
+    campaign.units.push_back(Unit(static_cast<std::uint32_t>(k) + 1));
+  for (std::size_t k = 0; k < robots->size(); ++k) {
+    Rng rng = Rng::Stream(seed, "robots", k);
+    AddMoves(closed, &(*robots)[k], &rng, &campaign);
+  }
+  if (closed)
+    campaign.covariates.push_back({"from_measured", std::vector<double>(campaign.rows(), 1)});
+  EXPECT_TRUE(Validate(campaign));
+  return campaign;
+}
+
+PlantedAxis Healthy() { return {}; }
+PlantedAxis Scaled(double cw, double ccw) {
+  return {.is = AxisClass::kScale, .scale_cw = cw, .scale_ccw = ccw};
+}
+PlantedAxis StuckAt(double deg) {
+  return {.is = AxisClass::kStuck, .begins_deg = deg, .sticks = true};
+}
+
+// Phi has no stalls and one scale here: an open loop would drive it out of its range.
+std::vector<Robot> Robots() {
+  const PlantedAxis slips{.is = AxisClass::kSlipping,
+                          .scale_cw = 0.8,
+                          .scale_ccw = 0.8,
+                          .stall_share = 0.45,
+                          .begins_deg = 10};
+  const PlantedAxis parked{.is = AxisClass::kUnknown, .is_parked = true};
+  return {{{Healthy(), Healthy()}},
+          {{Scaled(0.6, 0.6), Healthy()}},
+          {{Healthy(), Scaled(0.6, 0.6)}},
+          {{Scaled(0.7, 0.9), Healthy()}},
+          {{slips, Healthy()}},
+          {{Healthy(), parked}},
+          {{StuckAt(25), Healthy()}},
+          {{Healthy(), StuckAt(75)}}};
+}
+
+void ExpectAsPlanted(const PlantedAxis& planted, std::size_t stalls, const AxisReport& report) {
+  EXPECT_EQ(Name(report.is), Name(planted.is));
+  const bool turns = planted.is != AxisClass::kStuck && planted.is != AxisClass::kUnknown;
+  ASSERT_EQ(report.scale_cw.has_value(), turns);
+  ASSERT_EQ(report.scale_ccw.has_value(), turns);
+  if (turns) {
+    EXPECT_NEAR(*report.scale_cw, planted.scale_cw, 0.02);
+    EXPECT_NEAR(*report.scale_ccw, planted.scale_ccw, 0.02);
+    EXPECT_EQ(report.stalls, stalls);
+  }
+  ASSERT_EQ(report.stuck_at_deg.has_value(), planted.is == AxisClass::kStuck);
+  if (report.stuck_at_deg) {
+    EXPECT_NEAR(std::remainder(*report.stuck_at_deg - planted.begins_deg, 360), 0, 1);
+  }
+}
+
+TEST(AxisClasses, AreThosePlantedInOpenAndInClosedLoops) {
+  const std::uint64_t seed = TestSeed(81);
+  FOCALFLEET_TRACE_SEED(seed);
+  for (const bool closed : {false, true}) {
+    std::vector<Robot> robots = Robots();
+    const Campaign campaign = CampaignOf(seed, closed, &robots);
+    const std::vector<AxisReport> axes = ClassifyAxes(campaign, campaign.units);
+    ASSERT_EQ(axes.size(), 2 * robots.size());
+    for (std::size_t k = 0; k < axes.size(); ++k) {
+      SCOPED_TRACE((closed ? "closed, robot " : "open, robot ") + std::to_string(k / 2) +
+                   (k % 2 == kTheta ? ", theta" : ", phi"));
+      const PlantedAxis& planted = robots[k / 2].axis[k % 2];
+      EXPECT_EQ(axes[k].unit_id, campaign.units[k / 2].id);
+      EXPECT_EQ(axes[k].axis, k % 2);
+      ExpectAsPlanted(planted, robots[k / 2].stalls[k % 2], axes[k]);
+      EXPECT_EQ(axes[k].wraps, 0u);
+      // In an open loop nobody saw where the first move began.
+      const std::size_t seen = closed ? kMoves : kMoves - 1;
+      EXPECT_EQ(axes[k].moves, planted.is_parked ? 0 : seen);
+    }
+    const double rms_um = axes[kTheta].rms_um;
+    EXPECT_NEAR(rms_um, 1e3 * std::numbers::sqrt2 * kNoise_mm, closed ? 6 : 1.5) << closed;
+    EXPECT_EQ(axes[kPhi].rms_um, rms_um) << "both axes have the unit's";
+  }
+}
+
+TEST(AxisClasses, EachDirectionHasItsOwnScaleInAClosedLoop) {
+  const std::uint64_t seed = TestSeed(82);
+  FOCALFLEET_TRACE_SEED(seed);
+  std::vector<Robot> robots = {{{Scaled(0.4, 0.7), Scaled(0.8, 0.5)}}};
+  const Campaign campaign = CampaignOf(seed, true, &robots);
+  for (const AxisReport& axis : ClassifyAxes(campaign, campaign.units))
+    ExpectAsPlanted(robots[0].axis[axis.axis], 0, axis);
+}
+
+// Only a closed loop knows whole turns.
+TEST(AxisClasses, AnAxisThatEndsWholeTurnsOffIsWrapped) {
+  const std::uint64_t seed = TestSeed(83);
+  FOCALFLEET_TRACE_SEED(seed);
+  std::vector<Robot> robots = {
+      {{{.is = AxisClass::kWrapped, .begins_deg = 0, .wraps = true}, Healthy()}}};
+  const Campaign campaign = CampaignOf(seed, true, &robots);
+  const AxisReport theta = ClassifyAxes(campaign, campaign.units)[kTheta];
+  ExpectAsPlanted(robots[0].axis[kTheta], 0, theta);
+  EXPECT_EQ(theta.wraps, kMoves - 1) << "no next move tells the turn of the last";
+}
+
+// A stuck axis is at one place, also where commands are more than half a turn away.
+TEST(AxisClasses, AStuckAxisIsWhereItIsWhateverItsCommands) {
+  const std::uint64_t seed = TestSeed(84);
+  FOCALFLEET_TRACE_SEED(seed);
+  Rng rng = Rng::Stream(seed, "commands");
+  for (const double stuck_deg : {-150.0, -20.0, 100.0, 150.0}) {
+    std::vector<Robot> robots = {{{StuckAt(stuck_deg), Healthy()}}};
+    Campaign campaign = CampaignOf(seed, true, &robots);
+    for (double& cmd_deg : campaign.cmd_deg[kTheta]) cmd_deg = rng.Uniform(-160, 160);
+    // No next move tells the turn of the last, which is therefore shorter than half a turn.
+    campaign.cmd_deg[kTheta].back() = stuck_deg > 0 ? stuck_deg - 90 : stuck_deg + 90;
+    ExpectAsPlanted(robots[0].axis[kTheta], 0, ClassifyAxes(campaign, campaign.units)[kTheta]);
+  }
+}
+
+TEST(AxisClasses, FewMovesAndMovesThatNobodySawTellNothing) {
+  std::vector<Robot> robots = {{{Healthy(), Healthy()}}, {{Healthy(), Healthy()}}};
+  Campaign campaign = CampaignOf(1, false, &robots);
+  const auto hide = [&](std::size_t row) {
+    campaign.x_mm[row] = campaign.y_mm[row] = std::numeric_limits<double>::quiet_NaN();
+  };
+  hide(20);
+  for (std::size_t row = kMoves; row < 2 * kMoves; ++row) hide(row);
+  std::vector<AxisReport> axes = ClassifyAxes(campaign, campaign.units);
+  EXPECT_EQ(axes[kTheta].moves, kMoves - 3) << "the first, the hidden one and the one after it";
+  EXPECT_EQ(axes[kTheta].is, AxisClass::kHealthy);
+  EXPECT_EQ(axes[2 + kTheta].moves, 0u);
+  EXPECT_EQ(axes[2 + kTheta].is, AxisClass::kUnknown);
+  EXPECT_FALSE(axes[2 + kTheta].scale_cw || axes[2 + kTheta].scale_ccw);
+  EXPECT_TRUE(std::isnan(axes[2 + kTheta].rms_um));
+  for (std::size_t row = 5; row < kMoves; ++row) hide(row);
+  axes = ClassifyAxes(campaign, campaign.units);
+  EXPECT_EQ(axes[kTheta].moves, 4u);
+  EXPECT_EQ(axes[kTheta].is, AxisClass::kUnknown);
+}
+
+TEST(AxisClasses, AreCountedByName) {
+  const auto axis = [](AxisClass is) { return AxisReport{.is = is}; };
+  EXPECT_THAT(
+      CountByClass({axis(AxisClass::kStuck), axis(AxisClass::kHealthy), axis(AxisClass::kScale),
+                    axis(AxisClass::kHealthy), axis(AxisClass::kSlipping),
+                    axis(AxisClass::kWrapped), axis(AxisClass::kUnknown)}),
+      ElementsAre(Pair("healthy", 2), Pair("scale", 1), Pair("slipping", 1), Pair("stuck", 1),
+                  Pair("unknown", 1), Pair("wrapped", 1)));
+  EXPECT_TRUE(CountByClass({}).empty());
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
