@@ -225,16 +225,16 @@ std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names
 }
 
 std::string WriteUnitsByClass(const sim::Diagnosis& diagnosis) {
-  std::string text = "unit_id,axis,class,scale_cw,scale_ccw,stalls,stuck_at_deg,wraps,rms_um,moves\n";
+  std::string text =
+      "unit_id,axis,class,scale_cw,scale_ccw,stalls,stuck_at_deg,wraps,rms_um,moves\n";
   const auto number = [](std::optional<double> value, int decimals) {
     return value && std::isfinite(*value) ? fmt::format("{:.{}f}", *value, decimals) : "";
   };
   for (const sim::AxisReport& axis : diagnosis.axes)
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", axis.unit_id,
-                        axis.axis == sim::kTheta ? "theta" : "phi", sim::Name(axis.is),
-                        number(axis.scale_cw, 4), number(axis.scale_ccw, 4), axis.stalls,
-                        number(axis.stuck_at_deg, 2), axis.wraps, number(axis.rms_um, 1),
-                        axis.moves);
+    text += fmt::format(
+        "{},{},{},{},{},{},{},{},{},{}\n", axis.unit_id, axis.axis == sim::kTheta ? "theta" : "phi",
+        sim::Name(axis.is), number(axis.scale_cw, 4), number(axis.scale_ccw, 4), axis.stalls,
+        number(axis.stuck_at_deg, 2), axis.wraps, number(axis.rms_um, 1), axis.moves);
   return text;
 }
 

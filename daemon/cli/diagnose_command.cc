@@ -153,7 +153,8 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
     Say(context, fmt::format("stuck, or off by far more than others and by no cause: unit {}",
                              fmt::join(diagnosis.outliers.units, ", ")));
   if (const std::string patches = PatchTable(diagnosis); !patches.empty()) Say(context, patches);
-  Say(context, options.out + "/{report.json, report.html, model.toml, next_moves.csv, units_by_class.csv}");
+  Say(context,
+      options.out + "/{report.json, report.html, model.toml, next_moves.csv, units_by_class.csv}");
   return ExitCode::kOk;
 }
 
@@ -272,7 +273,8 @@ void AddDiagnoseCommand(CommandLine* line) {
       ->type_name("DIR");
   command
       ->add_option("--out", options->out,
-                   "Folder for report.json, report.html, model.toml, next_moves.csv, units_by_class.csv; required but "
+                   "Folder for report.json, report.html, model.toml, next_moves.csv, "
+                   "units_by_class.csv; required but "
                    "with --against")
       ->type_name("DIR");
   command

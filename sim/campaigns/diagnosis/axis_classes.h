@@ -1,6 +1,7 @@
 // Classes of axes: what each axis of each unit is like, for those who repair or exclude it. A class
-// is read from the angles that the axis turned by, as the camera saw them, against those that it was
-// told. No cause enters: a robust fit of one number for each direction, as observatories keep them.
+// is read from the angles that the axis turned by, as the camera saw them, against those that it
+// was asked. No cause enters: a robust fit of one number for each direction, as observatories keep
+// them.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +18,7 @@ namespace focalfleet::sim {
 
 enum class AxisClass {
   kHealthy,
-  kScale,     // turns another share of what it is told, in every move
+  kScale,     // turns another share of what it is asked, in every move
   kSlipping,  // the same, and long moves stall
   kStuck,     // does not turn
   kWrapped,   // most moves end a whole turn off
@@ -29,8 +30,8 @@ struct AxisReport {
   std::uint32_t unit_id = 0;
   std::size_t axis = kTheta;
   AxisClass is = AxisClass::kUnknown;
-  // Angle turned by angle told, of moves that do not stall: clockwise (falling angles) and counter-
-  // clockwise. No value: no such moves.
+  // Angle turned by angle asked, of moves that do not stall: clockwise (falling angles) and
+  // counter- clockwise. No value: no such moves.
   std::optional<double> scale_cw, scale_ccw;
   std::size_t stalls = 0;  // long moves that turned nothing
   std::size_t wraps = 0;   // moves that ended a whole turn off

@@ -113,6 +113,10 @@ void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) 
     diagnosis->unknown.push_back(std::move(*walk));
     return;
   }
+  if (auto odd = FindOddExposures(*fit, options.family_wise); odd && matters(*odd)) {
+    diagnosis->unknown.push_back(std::move(*odd));
+    return;
+  }
   auto fine = FindFineStructure(*fit, options.family_wise);
   if (fine && matters(*fine)) diagnosis->unknown.push_back(std::move(*fine));
 }
@@ -156,8 +160,8 @@ double ShareBeyondReach(const Fit& fit) {
     const CampaignUnit& by = fit.model.units[unit];
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
       if (!fit.Used(row)) continue;
-      const double way_mm = std::hypot(campaign.x_mm[row] - by.base_x_mm,
-                                       campaign.y_mm[row] - by.base_y_mm);
+      const double way_mm =
+          std::hypot(campaign.x_mm[row] - by.base_x_mm, campaign.y_mm[row] - by.base_y_mm);
       rows += 1;
       beyond += way_mm > by.arm_mm[kTheta] + by.arm_mm[kPhi] + kBeyond_mm ? 1 : 0;
     }
@@ -362,7 +366,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   Selection selection = FindModel(templates, options, rule, truth.get(), &fit, &diagnosis);
   DropBeaten(options.family_wise, options.seed, &fit, &selection);
   DropNeedlessSteps(&fit);
-  CompareWithSteps(fit, &selection);
+  CompareWithSteps(fit, options.family_wise, &selection);
   const RotorCauses rotors = SettleRotors(templates, rule, options.leave_out, &fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);

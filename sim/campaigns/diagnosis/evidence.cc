@@ -22,7 +22,7 @@ using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
 
 constexpr double kSizes[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 100, 300, 1000};  // of the prior
-constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};     // of units that have it
+constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};  // of units that have it
 constexpr double kOddsMax = 1e90;  // beyond it one of two summands is lost in the other's rounding
 constexpr double kFlat = 1e-9;  // of the largest curvature: a direction that the data do not show
 

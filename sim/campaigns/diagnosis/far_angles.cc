@@ -8,7 +8,7 @@
 namespace focalfleet::sim {
 
 AnglesToPlace FindAngles(const CampaignUnit& unit, double x_mm, double y_mm, double theta_deg,
-                    double phi_deg) {
+                         double phi_deg) {
   constexpr double kBeyond = 0.02;  // of the arms
   const double a = unit.arm_mm[kTheta], b = unit.arm_mm[kPhi];
   const double x = x_mm - unit.base_x_mm, y = y_mm - unit.base_y_mm, r = std::hypot(x, y);
@@ -20,17 +20,21 @@ AnglesToPlace FindAngles(const CampaignUnit& unit, double x_mm, double y_mm, dou
   for (const double side : {1.0, -1.0}) {
     const double phi = side * bend_deg - unit.zero_deg[kPhi];
     const double bend = side * bend_deg * kRadiansPerDegree;
-    const double theta = (std::atan2(y, x) - std::atan2(b * std::sin(bend), a + b * std::cos(bend))) /
-                             kRadiansPerDegree -
-                         unit.zero_deg[kTheta];
+    const double theta =
+        (std::atan2(y, x) - std::atan2(b * std::sin(bend), a + b * std::cos(bend))) /
+            kRadiansPerDegree -
+        unit.zero_deg[kTheta];
     const double of_theta = std::remainder(theta - theta_deg, 360);
-    const double of_phi = std::remainder(phi - phi_deg, 360);
     // Phi decides the side: it has a range of half a turn, and theta any angle.
-    const bool in_range = phi_deg + of_phi >= unit.min_deg[kPhi] - 5 &&
-                          phi_deg + of_phi <= unit.max_deg[kPhi] + 5;
-    const double cost = std::abs(of_phi) + (in_range ? 0 : 360);
-    if (cost < least)
-      least = cost, out.theta_deg = theta_deg + of_theta, out.phi_deg = phi_deg + of_phi;
+    for (const double turn : {-360.0, 0.0, 360.0}) {
+      constexpr double kBeyondRange_deg = 5;  // an error at the end of the range
+      const double of_phi = std::remainder(phi - phi_deg, 360) + turn;
+      const bool in_range = phi_deg + of_phi >= unit.min_deg[kPhi] - kBeyondRange_deg &&
+                            phi_deg + of_phi <= unit.max_deg[kPhi] + kBeyondRange_deg;
+      const double cost = std::abs(of_phi) + (in_range ? 0 : 720);
+      if (cost < least)
+        least = cost, out.theta_deg = theta_deg + of_theta, out.phi_deg = phi_deg + of_phi;
+    }
   }
   return out;
 }
@@ -45,9 +49,12 @@ void TakeFarAngles(const UnitTrack& track, const std::vector<double>& theta_deg,
   for (std::size_t i = 0; i < track.moves; ++i) {
     const std::size_t row = track.first_row + i;
     if (track.restarts[i] != 0) off_deg = 0;
-    if (!std::isfinite((*x_um)[row]) || std::hypot((*x_um)[row], (*y_um)[row]) < kFar_um) continue;
-    const AnglesToPlace at = FindAngles(*track.unit, campaign.x_mm[row], campaign.y_mm[row],
-                                   theta_deg[i], phi_deg[i]);
+    // An axis that is a whole turn off is at its place.
+    const bool is_near =
+        std::hypot((*x_um)[row], (*y_um)[row]) < kFar_um && std::abs(off_deg) < 180;
+    if (!std::isfinite((*x_um)[row]) || is_near) continue;
+    const AnglesToPlace at =
+        FindAngles(*track.unit, campaign.x_mm[row], campaign.y_mm[row], theta_deg[i], phi_deg[i]);
     if (!at.reached) continue;
     double theta_off = at.theta_deg - theta_deg[i];
     const double phi_off = at.phi_deg - phi_deg[i];

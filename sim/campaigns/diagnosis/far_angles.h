@@ -16,7 +16,7 @@ struct AnglesToPlace {
   bool reached = false;
 };
 AnglesToPlace FindAngles(const CampaignUnit& unit, double x_mm, double y_mm, double theta_deg,
-                    double phi_deg);
+                         double phi_deg);
 
 /// Replaces residuals of the unit's rows that are farther than half a millimetre by those of their
 /// angles. theta_deg, phi_deg: predicted. Shapes: (moves); x_um, y_um (rows).

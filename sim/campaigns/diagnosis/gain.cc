@@ -115,8 +115,7 @@ double AngleSpread(const Noise& noise, std::size_t axis) {
 double NoiseFloor(const Fit& fit) {
   double sum = 0, count = 0;
   constexpr double kRadians = std::numbers::pi / 180;
-  const double rest2 =
-      fit.noise.rest_um * fit.noise.rest_um * SummedVariance(fit.noise.carry[2]);
+  const double rest2 = fit.noise.rest_um * fit.noise.rest_um * SummedVariance(fit.noise.carry[2]);
   for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
     const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
     const double f2 = fit.noise.unit_factor[unit] * fit.noise.unit_factor[unit];

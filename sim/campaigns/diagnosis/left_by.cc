@@ -9,9 +9,12 @@ UnitLeft LeftBy(const CampaignModel& model, const Campaign& campaign, std::size_
   const std::size_t end = campaign.first_row[unit + 1];
   std::size_t begin = campaign.first_row[unit];
   if (begin == end) return {};
-  const std::span<const double> rehomed = campaign.Find("rehomed");
-  for (std::size_t row = begin; row < end && !rehomed.empty(); ++row)
-    if (rehomed[row] > 0.5) begin = row;
+  // A loop that was closed begins anew where the camera saw the fibre.
+  for (const std::string_view anew : {"rehomed", "from_measured"}) {
+    const std::span<const double> column = campaign.Find(anew);
+    for (std::size_t row = begin; row < end && !column.empty(); ++row)
+      if (column[row] > 0.5) begin = row;
+  }
   UnitLeft left{.moved = true};
   PoseTrack track(model.units[unit],
                   {campaign.from_deg[kTheta][begin], campaign.from_deg[kPhi][begin]});

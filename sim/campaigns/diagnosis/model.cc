@@ -82,7 +82,7 @@ std::string_view Name(Sharing sharing) {
 AmplitudeSummary Summarise(const ModelTerm& term) {
   const std::size_t c = term.form.columns;
   struct Group {
-    double value = 0;   // of one column; of several their root sum of squares
+    double value = 0;  // of one column; of several their root sum of squares
     double sigma2 = 0;
   };
   std::set<std::uint32_t> groups;
@@ -174,7 +174,8 @@ void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack
 
 UnitTrack TrackOf(const CampaignModel& model, const CampaignFacts& facts, std::size_t unit) {
   UnitTrack track = MakeTrack(facts, unit, model.units[unit]);
-  const bool stepped = std::ranges::find(model.events, unit, &EventTerm::unit) != model.events.end();
+  const bool stepped =
+      std::ranges::find(model.events, unit, &EventTerm::unit) != model.events.end();
   if (!stepped && !model.large_errors) return track;
   PoseErrors errors;
   errors.Reset(track.moves);

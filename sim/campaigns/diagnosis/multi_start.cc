@@ -70,7 +70,8 @@ double BetterBy(const Fit& fit, const Fit& than) {
 
 Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Selection selection = SelectWithEvents(templates, rule, fit);
-  if (fit->facts->homings > 0 && fit->facts->closed.empty()) TryHomings(templates, rule, &selection, fit);
+  if (fit->facts->homings > 0 && fit->facts->closed.empty())
+    TryHomings(templates, rule, &selection, fit);
   return selection;
 }
 

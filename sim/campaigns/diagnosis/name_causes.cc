@@ -5,6 +5,7 @@
 #include <numeric>
 #include <set>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/distortion.h"
 #include "sim/campaigns/diagnosis/events.h"
 #include "sim/campaigns/diagnosis/families.h"
@@ -54,10 +55,14 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   cause.ci95[0] = amplitude.value - 1.96 * amplitude.sigma;
   cause.ci95[1] = amplitude.value + 1.96 * amplitude.sigma;
   const auto [low, high] = RangeOfAmplitude(effect);
-  cause.at_bound = std::ranges::any_of(
-      term.amplitude, [&](double one) { return one <= low || one >= high; });
+  cause.at_bound =
+      std::ranges::any_of(term.amplitude, [&](double one) { return one <= low || one >= high; });
   const TermTrace trace = TraceOf(fit, term);
-  cause.size_um = trace.rms_um;
+  // No error moves a fibre farther than across its patrol disc.
+  double disc_um = 0;
+  for (const CampaignUnit& unit : fit.model.units)
+    disc_um = std::max(disc_um, 2 * kUmPerMm * (unit.arm_mm[kTheta] + unit.arm_mm[kPhi]));
+  cause.size_um = std::min(trace.rms_um, disc_um);
   cause.delta_log_likelihood = accepted.evidence.chi_square / 2;
   const double square = std::accumulate(trace.square_um2.begin(), trace.square_um2.end(), 0.0);
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
@@ -94,6 +99,7 @@ void MergeCauses(std::vector<CauseFound>* causes) {
       same->scope = cause.scope;
     }
     AddUnits(cause, &*same);
+    same->at_bound = same->at_bound || cause.at_bound;
     same->size_um = std::hypot(same->size_um, cause.size_um);
     same->delta_log_likelihood += cause.delta_log_likelihood;
     if (same->evidence_of_unit.empty()) cause.evidence_of_unit.clear();

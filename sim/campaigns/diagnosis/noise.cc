@@ -122,7 +122,6 @@ double CostOf(const NoiseUnit& unit, const Noise& noise) {
   return cost;
 }
 
-
 double Lever_um(const std::vector<NoiseUnit>& sample, int axis) {
   double most = 0;
   for (const NoiseUnit& unit : sample)
@@ -193,8 +192,8 @@ class NoiseSearch {
   // A normal prior of the logarithm. A spread below a hundredth of the camera's noise is none.
   static double PriorCost(double spread_um, const Noise& noise) {
     const double least = noise.place_um / (kExpectedWithin * kExpectedWithin);
-    const double decades = std::log(std::max(spread_um, least) / noise.place_um) /
-                           std::log(kExpectedWithin);
+    const double decades =
+        std::log(std::max(spread_um, least) / noise.place_um) / std::log(kExpectedWithin);
     return decades * decades / 2;
   }
   template <class Change>
@@ -273,52 +272,61 @@ std::size_t OwnColumns(const Fit& fit, std::size_t unit) {
   return columns;
 }
 
-// A factor from the median of n whitened squares, drawn to the usual one.
-double Shrunk(double own, double n, double usual) {
-  constexpr double kShrink = 10;
-  return std::sqrt(std::max((n * own + kShrink * usual) / (n + kShrink), 1e-6));
-}
-
 // Errors that all units may have alike in one exposure: of theta, of phi, in x, in y. They are an
 // effect, not noise.
-constexpr Eigen::Index kAlike = 4;
+constexpr Eigen::Index kAlikeErrors = 4;
 
-// Of a used row: its whitened place, and what each error alike makes of it.
+// A used row: its whitened place, and what each error alike makes of it.
 struct WhiteRow {
   std::size_t exposure = 0;
+  double camera_share = 1;  // of the row's variance: an exposure's factor is of this part alone
   Eigen::Vector2d y;
-  Eigen::Matrix<double, 2, kAlike> alike;
+  Eigen::Matrix<double, 2, kAlikeErrors> alike;
 };
 struct UnitLengths {
   std::vector<double> square;  // of the used rows
   std::vector<WhiteRow> rows;  // the same, divided by the unit's factor
 };
 
-Eigen::Matrix<double, 2, kAlike> AlikeOf(const WhiteUnit& white, std::size_t k) {
+Eigen::Matrix<double, 2, kAlikeErrors> AlikeOf(const WhiteUnit& white, std::size_t k) {
   const double* t = &white.turn_um[4 * k];
   const double* w = white.filter[k].w;
   Eigen::Matrix2d root;
   root << w[0], w[1], w[1], w[2];
-  Eigen::Matrix<double, 2, kAlike> errors;
+  Eigen::Matrix<double, 2, kAlikeErrors> errors;
   errors << t[0], t[2], 1, 0, t[1], t[3], 0, 1;
   return root * errors;
+}
+
+// The share of the camera's own noise in the variance of a used row.
+double CameraShare(const Fit& fit, std::size_t unit, const WhiteUnit& white, std::size_t k,
+                   double weight) {
+  const std::size_t row = white.track.first_row + white.moves[k];
+  const double factor = fit.noise.exposure_factor.empty()
+                            ? 1
+                            : fit.noise.exposure_factor[fit.facts->exposures.of_row[row]];
+  const double own_um = fit.noise.unit_factor[unit] * fit.noise.place_um * factor;
+  const double* w = white.filter[k].w;
+  const double inverse = (w[0] * w[0] + 2 * w[1] * w[1] + w[2] * w[2]) / 2 / weight;
+  return std::min(own_um * own_um * inverse, 1.0);
 }
 
 // Squared lengths of an exposure's rows without what they have alike, scaled for what the fit of
 // that takes from them.
 std::vector<double> LengthsOf(const std::vector<const WhiteRow*>& rows) {
   constexpr double kFar = 3;  // whitened length from which a row counts less
-  Eigen::Matrix<double, kAlike, kAlike> normal = Eigen::Matrix<double, kAlike, kAlike>::Zero();
-  Eigen::Matrix<double, kAlike, 1> right = Eigen::Matrix<double, kAlike, 1>::Zero();
+  Eigen::Matrix<double, kAlikeErrors, kAlikeErrors> normal =
+      Eigen::Matrix<double, kAlikeErrors, kAlikeErrors>::Zero();
+  Eigen::Matrix<double, kAlikeErrors, 1> right = Eigen::Matrix<double, kAlikeErrors, 1>::Zero();
   for (const WhiteRow* row : rows) {
     const double weight = std::min(1.0, kFar / std::max(row->y.norm(), 1e-6));
     normal += weight * row->alike.transpose() * row->alike;
     right += weight * row->alike.transpose() * row->y;
   }
-  const Eigen::Matrix<double, kAlike, 1> alike =
+  const Eigen::Matrix<double, kAlikeErrors, 1> alike =
       normal.completeOrthogonalDecomposition().solve(right);
   const double n = 2 * static_cast<double>(rows.size());
-  const double left = n / std::max(n - static_cast<double>(kAlike), 1.0);
+  const double left = n / std::max(n - static_cast<double>(kAlikeErrors), 1.0);
   std::vector<double> squares;
   for (const WhiteRow* row : rows)
     squares.push_back((row->y - row->alike * alike).squaredNorm() * left);
@@ -345,8 +353,54 @@ void Normalise(Noise* noise) {
   noise->rest_um *= usual;
 }
 
+// An estimate of the logarithm of a variance, and the variance of its error.
+struct LogVariance {
+  double value = 0;
+  double error2 = 0;  // 0: no data
+};
+
+// The relative variance of the median of n squared lengths, times n: they have an exponential law,
+// whose median is 2 ln 2 and whose density there is a quarter.
+constexpr double kMedianError = 4 / (kMedianSquare * kMedianSquare);
+
+// Draws estimates to their median by what they scatter beyond their errors (empirical Bayes). One
+// that is far beyond both is another kind, and stays.
+// Source: Efron, Large-Scale Inference, chapter 1.
+std::vector<double> DrawTogether(const std::vector<LogVariance>& estimates) {
+  constexpr double kFar = 3;       // in standard deviations
+  constexpr double kMad = 1.4826;  // standard deviation of a normal law by its median deviation
+  std::vector<double> values, errors2, deviations;
+  for (const LogVariance& one : estimates)
+    if (one.error2 > 0) values.push_back(one.value), errors2.push_back(one.error2);
+  if (values.empty()) return std::vector<double>(estimates.size(), 0);
+  const double middle = Median(values);
+  for (const double value : values) deviations.push_back(std::abs(value - middle));
+  const double scatter = kMad * Median(std::move(deviations));
+  const double true2 = std::max(scatter * scatter - Median(std::move(errors2)), 0.0);
+  std::vector<double> drawn;
+  for (const LogVariance& one : estimates) {
+    const double off = one.error2 > 0 ? one.value - middle : 0;
+    const bool is_far = off * off > kFar * kFar * (true2 + one.error2);
+    drawn.push_back(middle + (is_far ? 1 : true2 / (true2 + one.error2 + 1e-12)) * off);
+  }
+  return drawn;
+}
+
+// The variance of the camera's noise in an exposure, by its present factor.
+LogVariance ExposureVariance(const std::vector<const WhiteRow*>& rows, double factor) {
+  constexpr double kLeast = 0.05;  // of the present variance: less is not resolved in one step
+  if (rows.empty()) return {};
+  const auto n = static_cast<double>(rows.size());
+  double share = 0;
+  for (const WhiteRow* row : rows) share += row->camera_share / n;
+  // Squares grow by the camera's share of them.
+  const double excess = (Median(LengthsOf(rows)) / kMedianSquare - 1) / share;
+  return {2 * std::log(factor) + std::log(std::max(1 + excess, kLeast)),
+          kMedianError / (n * share * share)};
+}
+
 void FitFactors(Fit* fit) {
-  constexpr std::size_t kUnitsMin = 6;  // that an exposure's factor is told from
+  constexpr std::size_t kUnitsMin = 6;  // that an exposure's factor is estimated from
   const std::size_t units = fit->model.units.size();
   const bool with_exposures = units >= kUnitsMin;
   std::vector<UnitLengths> lengths(units);
@@ -361,39 +415,41 @@ void FitFactors(Fit* fit) {
         if (with_exposures)
           lengths[unit].rows.push_back(
               {fit->facts->exposures.of_row[white.track.first_row + white.moves[k]],
+               CameraShare(*fit, unit, white, k, weights[k]),
                white.y.segment<2>(at) / std::sqrt(weights[k]),
                AlikeOf(white, k) / std::sqrt(weights[k])});
       }
     }
   });
-  std::vector<double> own(units, -1), fleet;
+  std::vector<LogVariance> of_unit(units);
   for (std::size_t unit = 0; unit < units; ++unit) {
     const double n = 2.0 * static_cast<double>(lengths[unit].square.size());
     const double left = n - static_cast<double>(OwnColumns(*fit, unit));
     if (left < 4) continue;
-    own[unit] = Median(lengths[unit].square) / kMedianSquare * n / left;
-    fleet.push_back(own[unit]);
+    const double own = Median(lengths[unit].square) / kMedianSquare * n / left;
+    of_unit[unit] = {2 * std::log(fit->noise.unit_factor[unit]) + std::log(std::max(own, 1e-6)),
+                     2 * kMedianError / left};
   }
-  const double usual = fleet.empty() ? 1 : Median(fleet);
+  const std::vector<double> unit_variance = DrawTogether(of_unit);
+  std::vector<std::vector<const WhiteRow*>> of_exposure(fit->facts->exposures.size());
   for (std::size_t unit = 0; unit < units; ++unit) {
-    const double n = own[unit] < 0 ? 0 : static_cast<double>(lengths[unit].square.size());
-    fit->noise.unit_factor[unit] *= Shrunk(std::max(own[unit], 0.0), n, usual);
+    const double factor = std::exp(unit_variance[unit] / 2);
+    // Exposures get what is left after the units' factors.
+    const double change = factor / fit->noise.unit_factor[unit];
+    for (WhiteRow& row : lengths[unit].rows) {
+      row.y /= change, row.alike /= change;
+      of_exposure[row.exposure].push_back(&row);
+    }
+    fit->noise.unit_factor[unit] = factor;
   }
   if (!with_exposures) return Normalise(&fit->noise);
-  // Exposures get what is left after the units' factors.
-  std::vector<std::vector<const WhiteRow*>> of(fit->facts->exposures.size());
-  for (std::size_t unit = 0; unit < units; ++unit)
-    for (WhiteRow& row : lengths[unit].rows) {
-      const double factor = std::sqrt(std::max(own[unit], 1e-6));
-      row.y /= factor, row.alike /= factor;
-      of[row.exposure].push_back(&row);
-    }
   std::vector<double>& factor = fit->noise.exposure_factor;
-  factor.resize(of.size(), 1);
-  for (std::size_t e = 0; e < of.size(); ++e)
-    if (!of[e].empty())
-      factor[e] *= Shrunk(Median(LengthsOf(of[e])) / kMedianSquare,
-                          static_cast<double>(of[e].size()), 1);
+  factor.resize(of_exposure.size(), 1);
+  std::vector<LogVariance> variances;
+  for (std::size_t e = 0; e < of_exposure.size(); ++e)
+    variances.push_back(ExposureVariance(of_exposure[e], factor[e]));
+  const std::vector<double> drawn = DrawTogether(variances);
+  for (std::size_t e = 0; e < factor.size(); ++e) factor[e] = std::exp(drawn[e] / 2);
   Normalise(&fit->noise);
 }
 

@@ -102,7 +102,7 @@ class RestFilter {
   }
 
  private:
-  /// Of theta, phi, place: the one that a rest error belongs to.
+  /// The part (theta, phi, place) that a rest error belongs to.
   static constexpr std::size_t PartOf(std::size_t rest_error) {
     return std::min<std::size_t>(rest_error, 2);
   }

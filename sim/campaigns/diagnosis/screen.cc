@@ -1,7 +1,9 @@
 #include "sim/campaigns/diagnosis/screen.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "sim/campaigns/diagnosis/chances.h"
 #include "sim/campaigns/diagnosis/select.h"
 #include "sim/campaigns/diagnosis/term_trace.h"
 #include "sim/campaigns/effects/empirical.h"
@@ -53,7 +55,7 @@ Templates ScreenTemplates(const CampaignFacts& facts) {
     if (!column.varies() || name == "sigma_um" || name == "rehomed" || name == "pixel_x" ||
         name == "pixel_y")
       continue;
-    // What is periodic in time may have several periods in a night.
+    // A structure that is periodic in time may have several periods in a night.
     constexpr std::size_t kCosinesOfTime = 20;  // ten periods; half as many miss those beyond five
     const bool is_time = name == "t_s" || name == kOrder;
     const std::size_t cosines = is_time ? kCosinesOfTime : kEmpiricalCosines;
@@ -109,6 +111,45 @@ std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, s
                         .size_um = size_um,
                         .delta_log_likelihood = evidence.chi_square / 2},
                        stepped.model.terms.back()};
+}
+
+std::optional<UnknownFound> FindOddExposures(const Fit& fit, double family_wise) {
+  constexpr std::size_t kExposuresMin = 12;  // of which most have to be alike
+  constexpr double kMedianSquare = 0.455;    // of a standard normal number
+  if (fit.facts->exposures.size() < kExposuresMin) return std::nullopt;
+  Templates looks;
+  for (const int channel : {kThetaAngle, kPhiAngle})
+    looks.push_back({.effect = &EmpiricalCurve(),  // the cosine of order 0: one angle for all
+                     .axis = EffectAxis::kNone,
+                     .form = channel,
+                     .label = "exposure by exposure",
+                     .covariate = std::string(kOrder)});
+  const ScorePass pass = ScoreTemplates(fit, looks);
+  std::optional<UnknownFound> clearest;
+  for (std::size_t k = 0; k < looks.size(); ++k) {
+    std::vector<double> squares;
+    double sum = 0, weight = 0;
+    for (std::size_t e = 0; e < pass.scores[k].exposure_b.size(); ++e) {
+      const double b = pass.scores[k].exposure_b[e], g = pass.scores[k].exposure_g[e];
+      if (g > 0) squares.push_back(b * b / g), sum += b * b / g, weight += g;
+    }
+    if (squares.size() < kExposuresMin) continue;
+    // Errors of most exposures that are alike, too, are noise that units share.
+    const double spread = std::max(Median(squares) / kMedianSquare, 1.0);
+    const double most = *std::ranges::max_element(squares) / spread;
+    const double tests = static_cast<double>(looks.size() * squares.size());
+    const double log_p = LogLeastOf(LogChiSquareTail(most, 1), tests);
+    if (log_p > std::log(kUnknownShare * family_wise)) continue;
+    if (clearest && clearest->p_value <= std::exp(log_p)) continue;
+    const double rms_um =
+        fit.noise.typical_um * std::sqrt(sum / (2 * static_cast<double>(pass.values)));
+    clearest = UnknownFound{.covariate = std::string(kOrder),
+                            .channel = std::string(ChannelOf(looks[k])),
+                            .p_value = std::exp(log_p),
+                            .size_um = rms_um,
+                            .delta_log_likelihood = sum / 2};
+  }
+  return clearest;
 }
 
 }  // namespace focalfleet::sim

@@ -25,4 +25,8 @@ struct StructureLeft {
 /// family-wise rate.
 std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, std::uint64_t seed);
 
+/// Errors that all units have alike in a few exposures, along an angle. No smooth curve shows them.
+/// nullopt where chance explains them, at a share of the family-wise rate.
+std::optional<UnknownFound> FindOddExposures(const Fit& fit, double family_wise);
+
 }  // namespace focalfleet::sim

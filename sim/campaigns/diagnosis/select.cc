@@ -91,8 +91,8 @@ std::size_t IndexOf(const Templates& templates, const Template& form) {
   return kNoTerm;
 }
 
-// Amplitudes of a template move linearly: two rounds of noise, weights and step suffice.
-void Refit(Fit* fit) { SettleFit(fit, 2); }
+// Amplitudes are linear: two rounds of noise, weights and step suffice.
+void RefitTerms(Fit* fit) { SettleFit(fit, 2); }
 
 struct Look {
   ScorePass pass;
@@ -150,7 +150,7 @@ Best BestAmong(const Fit& fit, const Templates& templates, const FleetGroups& gr
 void DropTerm(std::size_t at, Fit* fit) {
   fit->model.terms.erase(fit->model.terms.begin() + static_cast<std::ptrdiff_t>(at));
   StepFit(fit);
-  Refit(fit);
+  RefitTerms(fit);
 }
 
 std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const FleetGroups& groups,
@@ -240,7 +240,7 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
     looks->Forget();
     fit->model.terms[t] = MakeTerm(templates[best.at], best.evidence, groups);
     StepFit(fit);
-    Refit(fit);
+    RefitTerms(fit);
     changed = true;
   }
   return changed;
@@ -355,11 +355,11 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
   const CampaignModel before = fit->model;
   fit->model.terms.push_back(MakeTerm((*templates)[best.at], best.evidence, groups));
   StepFit(fit);
-  Refit(fit);
+  RefitTerms(fit);
   if (SizeOf(*fit, fit->model.terms.back()) >= rule.size_min_um) return true;
   fit->model = before;
   UpdateResiduals(fit);
-  Refit(fit);
+  RefitTerms(fit);
   return false;
 }
 
@@ -407,7 +407,7 @@ Fit SomeUnits(const Fit& fit, std::size_t keep, std::uint64_t seed) {
          ++row)
       some.aside[row] = 1;
   UpdateWeights(&some);
-  Refit(&some);
+  RefitTerms(&some);
   return some;
 }
 
@@ -482,7 +482,7 @@ Selection Select(const Templates& library, const SelectionRule& rule, Fit* fit) 
   for (std::size_t t = 0; t < fit->model.terms.size(); ++t)
     if (!fit->model.terms[t].form.shape_of_unit.empty()) GiveShapes(library, groups, t, fit);
   StepFit(fit);
-  Refit(fit);
+  RefitTerms(fit);
   // Effects that only units have that were not examined.
   rule.progress("all units");
   Templates templates = library;

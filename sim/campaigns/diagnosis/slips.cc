@@ -73,8 +73,8 @@ Slip BestSlip(const StepRows& rows) {
       if (EndOfHistory(rows.track(), from) <= to) continue;
       const Eigen::VectorXd column = rows.Column(axis, to, true);
       const double g = column.squaredNorm(), b = column.dot(rows.left());
-      const double turns = std::clamp(std::round(b / std::max(g, 1e-300) / turn), -kTurnsMax,
-                                      kTurnsMax);
+      const double turns =
+          std::clamp(std::round(b / std::max(g, 1e-300) / turn), -kTurnsMax, kTurnsMax);
       const double step_deg = turns * turn, log_ratio = step_deg * b - step_deg * step_deg * g / 2;
       if (turns == 0 || log_ratio <= best.log_ratio) continue;
       if (const std::size_t move = MoveAgainst(rows.track(), axis, from, to, turns); move != 0)

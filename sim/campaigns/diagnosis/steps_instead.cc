@@ -76,14 +76,14 @@ std::vector<std::size_t> UnitsWithSmallSteps(const Fit& fit) {
 
 }  // namespace
 
-void CompareWithSteps(const Fit& fit, Selection* selection) {
+void CompareWithSteps(const Fit& fit, double family_wise, Selection* selection) {
   constexpr double kClearly = 20;  // a step has to be better by it, as otherwise none is named
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
     const TermTrace trace = TraceOf(fit, fit.model.terms[t]);
     if (!LivesInFewUnits(trace)) continue;
     Fit stepped = WithoutCauseOf(fit, fit.model.terms[t]);
     const std::size_t before = stepped.model.events.size();
-    if (AddEvents(&stepped) == 0) continue;
+    if (AddEvents(family_wise, &stepped) == 0) continue;
     const double behind = BetterBy(fit, stepped);
     if (behind >= kClearly) continue;
     std::vector<EventTerm>& events = stepped.model.events;

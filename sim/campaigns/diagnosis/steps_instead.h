@@ -11,7 +11,7 @@ namespace focalfleet::sim {
 
 /// Adds step_loss or lost_command as rivals of terms in few units that steps explain as well,
 /// though not for their price.
-void CompareWithSteps(const Fit& fit, Selection* selection);
+void CompareWithSteps(const Fit& fit, double family_wise, Selection* selection);
 
 /// Drops small steps of single units without which the model does as well.
 void DropNeedlessSteps(Fit* fit);

@@ -102,7 +102,8 @@ bool IsClosed(const UnitTrack& track, std::size_t move) {
 
 // The angles by which a move began off where the coordinator believed, per mm or degree of one
 // number of the geometry, degrees.
-std::array<double, 2> TurnAtBeginning(const UnitTrack& track, std::size_t move, Eigen::Index number) {
+std::array<double, 2> TurnAtBeginning(const UnitTrack& track, std::size_t move,
+                                      Eigen::Index number) {
   const UnitTrack& poses = track.beginnings->track;
   const std::size_t b = 2 * move;
   const double ex = poses.elbow_x_mm[b], ey = poses.elbow_y_mm[b];
@@ -135,7 +136,8 @@ Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white) {
     if (!IsClosed(track, i)) continue;
     for (Eigen::Index c = 0; c < 6; ++c) {
       const auto turn = TurnAtBeginning(track, i, c);
-      for (Eigen::Index xy = 0; xy < 2; ++xy) out(at + xy, c) -= t[xy] * turn[0] + t[2 + xy] * turn[1];
+      for (Eigen::Index xy = 0; xy < 2; ++xy)
+        out(at + xy, c) -= t[xy] * turn[0] + t[2 + xy] * turn[1];
     }
   }
   return out;

@@ -46,9 +46,9 @@ inline constexpr std::size_t kRestErrors = 4;
 
 /// The whitening of a used row: y = w (r - H e), e <- keep .* e before and + gain (r - H e) after.
 struct RowFilter {
-  double w[3];                 // symmetric root of the inverse covariance: xx, xy, yy; per um
+  double w[3];                   // symmetric root of the inverse covariance: xx, xy, yy; per um
   double gain[2 * kRestErrors];  // of each rest error by x, y
-  double keep[3];              // of theta, phi, place, since the used row before
+  double keep[3];                // of theta, phi, place, since the used row before
 };
 
 struct WhiteUnit {

@@ -25,8 +25,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   for (std::size_t i = 0; i < track.moves; ++i) {
     errors->x_mm[i] +=
         1e-3 * (amplitude[0] * std::sin(kTurn * x[i]) + amplitude[1] * std::cos(kTurn * x[i]));
-    errors->y_mm[i] +=
-        1e-3 * (in_y[0] * std::sin(kTurn * y[i]) + in_y[1] * std::cos(kTurn * y[i]));
+    errors->y_mm[i] += 1e-3 * (in_y[0] * std::sin(kTurn * y[i]) + in_y[1] * std::cos(kTurn * y[i]));
   }
 }
 

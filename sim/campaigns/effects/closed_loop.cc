@@ -1,5 +1,6 @@
 #include "sim/campaigns/effects/closed_loop.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "protocol/base/units.h"
@@ -15,7 +16,12 @@ std::array<std::vector<double>, 2> FindBeginErrors(const UnitTrack& track) {
   const CampaignUnit& table = track.facts->campaign->units[track.unit_index];
   const CampaignUnit& unit = *track.unit;
   for (std::size_t i = 0; i < track.moves; ++i) {
-    if (track.facts->closed[track.first_row + i] == 0 || track.restarts[i] != 0) continue;
+    if (track.restarts[i] != 0) continue;
+    if (track.facts->closed[track.first_row + i] == 0) {
+      // The coordinator counts on from where the loop was closed last.
+      for (std::vector<double>& of_axis : off_deg) of_axis[i] = i > 0 ? of_axis[i - 1] : 0;
+      continue;
+    }
     const double from[2] = {track.from_deg[kTheta][i], track.from_deg[kPhi][i]};
     const PlacePoint seen = PlaceOf(table, from[kTheta], from[kPhi]);
     for (int round = 0; round < kRounds; ++round) {
@@ -23,10 +29,10 @@ std::array<std::vector<double>, 2> FindBeginErrors(const UnitTrack& track) {
       const PlacePoint at = PlaceOf(unit, theta, phi);
       const double a = (theta + unit.zero_deg[kTheta]) * kRadiansPerDegree;
       const double b = a + (phi + unit.zero_deg[kPhi]) * kRadiansPerDegree;
-      const auto turn = AnglesOfShift(
-          unit.arm_mm[kTheta] * std::cos(a), unit.arm_mm[kTheta] * std::sin(a),
-          unit.arm_mm[kPhi] * std::cos(b), unit.arm_mm[kPhi] * std::sin(b), seen.x_mm - at.x_mm,
-          seen.y_mm - at.y_mm);
+      const auto turn =
+          AnglesOfShift(unit.arm_mm[kTheta] * std::cos(a), unit.arm_mm[kTheta] * std::sin(a),
+                        unit.arm_mm[kPhi] * std::cos(b), unit.arm_mm[kPhi] * std::sin(b),
+                        seen.x_mm - at.x_mm, seen.y_mm - at.y_mm);
       for (const std::size_t axis : {kTheta, kPhi}) off_deg[axis][i] += turn[axis];
     }
   }
@@ -37,14 +43,17 @@ std::array<std::vector<double>, 2> FindBeginErrors(const UnitTrack& track) {
 
 std::array<double, 2> AnglesOfShift(double elbow_x_mm, double elbow_y_mm, double reach_x_mm,
                                     double reach_y_mm, double shift_x_mm, double shift_y_mm) {
-  // Damped least squares: a turn of a radian that moves the fibre by less than this share of the
-  // arms is not asked for.
+  // A turn of a radian that moves the fibre by less than this share of the arms is not asked for:
+  // least squares are damped as far as that needs.
   constexpr double kDamping = 0.02;
   const double tx = -(elbow_y_mm + reach_y_mm), ty = elbow_x_mm + reach_x_mm;
   const double px = -reach_y_mm, py = reach_x_mm;
   const double arms2 = elbow_x_mm * elbow_x_mm + elbow_y_mm * elbow_y_mm + px * px + py * py;
-  const double least = kDamping * kDamping * arms2;
-  const double a = tx * tx + ty * ty + least, b = tx * px + ty * py, c = px * px + py * py + least;
+  double a = tx * tx + ty * ty, c = px * px + py * py;
+  const double b = tx * px + ty * py;
+  const double weakest = (a + c) / 2 - std::hypot((a - c) / 2, b);
+  const double damping = std::max(kDamping * kDamping * arms2 - weakest, 0.0);
+  a += damping, c += damping;
   const double u = tx * shift_x_mm + ty * shift_y_mm, v = px * shift_x_mm + py * shift_y_mm;
   const double determinant = a * c - b * b;
   return {(c * u - b * v) / determinant / kRadiansPerDegree,
@@ -83,20 +92,24 @@ void AddDifferences(const UnitTrack& track, const PoseErrors& along, PoseErrors*
   const UnitTrack& poses = track.beginnings->track;
   const auto to = errors->channels();
   const auto from = along.channels();
+  std::array<double, 2> begun_deg = {0, 0};  // since the loop was closed last
   for (std::size_t i = 0; i < track.moves; ++i) {
     for (std::size_t k = 0; k < to.size(); ++k) (*to[k])[i] += (*from[k])[2 * i + 1];
-    if (track.facts->closed[track.first_row + i] == 0 || track.restarts[i] != 0) continue;
-    const std::size_t b = 2 * i;
-    const double of_theta = along.arm_mm[kTheta][b] / track.unit->arm_mm[kTheta];
-    const double of_phi = along.arm_mm[kPhi][b] / track.unit->arm_mm[kPhi];
-    const double x = along.x_mm[b] + of_theta * poses.elbow_x_mm[b] + of_phi * poses.reach_x_mm[b];
-    const double y = along.y_mm[b] + of_theta * poses.elbow_y_mm[b] + of_phi * poses.reach_y_mm[b];
-    const auto shift = x == 0 && y == 0
-                           ? std::array<double, 2>{0, 0}
-                           : AnglesOfShift(poses.elbow_x_mm[b], poses.elbow_y_mm[b],
-                                           poses.reach_x_mm[b], poses.reach_y_mm[b], x, y);
-    for (const std::size_t axis : {kTheta, kPhi})
-      errors->angle_deg[axis][i] -= along.angle_deg[axis][b] + shift[axis];
+    if (track.restarts[i] != 0) {
+      begun_deg = {0, 0};
+    } else if (track.facts->closed[track.first_row + i] != 0) {
+      const std::size_t b = 2 * i;
+      const double of_theta = along.arm_mm[kTheta][b] / track.unit->arm_mm[kTheta];
+      const double of_phi = along.arm_mm[kPhi][b] / track.unit->arm_mm[kPhi];
+      const double x =
+          along.x_mm[b] + of_theta * poses.elbow_x_mm[b] + of_phi * poses.reach_x_mm[b];
+      const double y =
+          along.y_mm[b] + of_theta * poses.elbow_y_mm[b] + of_phi * poses.reach_y_mm[b];
+      begun_deg = AnglesOfShift(poses.elbow_x_mm[b], poses.elbow_y_mm[b], poses.reach_x_mm[b],
+                                poses.reach_y_mm[b], x, y);
+      for (const std::size_t axis : {kTheta, kPhi}) begun_deg[axis] += along.angle_deg[axis][b];
+    }
+    for (const std::size_t axis : {kTheta, kPhi}) errors->angle_deg[axis][i] -= begun_deg[axis];
   }
 }
 

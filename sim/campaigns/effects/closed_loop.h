@@ -1,11 +1,11 @@
-// Closed loop: before each move the camera saw where the fibre stood, and the coordinator began from
-// there. What an effect did up to then is in the beginning already. The effect therefore enters as
-// the difference of its error after the move and its error as the move began.
+// Closed loop: before each move the camera saw where the fibre stood, and the coordinator began
+// from there. The beginning has in it already all that an effect did up to then. The effect
+// therefore enters as the difference of its error after the move and its error as the move began.
 //
-// Both errors are of one track that has each move's beginning as a move of no length before it, with
-// the conditions of the exposure in which it was seen. An effect runs along that track as along any
-// other. What shifts places and arms, not angles, misleads the coordinator as the move begins: it
-// turns the axes by the angles that such a shift looks like.
+// Both errors are of one track that has each move's beginning as a move of no length before it,
+// with the conditions of the exposure in which it was seen. An effect runs along that track as
+// along any other. A shift of places or arms misleads the coordinator as the move begins: the
+// coordinator turns the axes by the angles that such a shift looks like.
 #pragma once
 
 #include <array>

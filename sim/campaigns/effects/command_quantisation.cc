@@ -8,7 +8,13 @@ namespace focalfleet::sim {
 namespace {
 
 enum class Step { kDegrees, kMotorTurns, kBits };
-enum class Rounding { kNearest, kCutMove, kDown };
+enum class Rounding {
+  kNearest,
+  kCutMove,
+  kDown,
+  kCutMean,  // moves are cut to a step too fine to be known: half a step is lost in each, on
+             // average
+};
 /// A template's form is its index in the table, and model files store it.
 struct Form {
   Step step;
@@ -23,12 +29,20 @@ constexpr std::array kForms = {
     Form{Step::kBits, Rounding::kCutMove, "moves are cut; bits a turn:"},
     Form{Step::kDegrees, Rounding::kDown, "rounded down; step, deg,"},
     Form{Step::kBits, Rounding::kDown, "rounded down; bits a turn:"},
+    Form{Step::kDegrees, Rounding::kCutMean, "moves are cut; on average; step, deg,"},
 };
 
-std::vector<double> ShapesOf(Step step) {
+std::vector<double> ShapesOf(const Form& form) {
+  const Step step = form.step;
+  // An amplitude of 0.5 to 1.5 reaches from each of these to the next.
+  if (form.rounding == Rounding::kCutMean) return {0.001, 0.002, 0.004, 0.008};
   if (step == Step::kMotorTurns) return {1, 4, 24, 96};
   if (step == Step::kBits) return {9, 10, 11, 12, 13, 14};
-  return {0.00125, 0.0025, 0.005, 0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2};
+  return {0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2};
+}
+
+bool IsCut(const Form& form) {
+  return form.rounding == Rounding::kCutMove || form.rounding == Rounding::kCutMean;
 }
 
 double Step_deg(const Form& form, double shape, double gear) {
@@ -38,10 +52,9 @@ double Step_deg(const Form& form, double shape, double gear) {
 
 void List(const CampaignFacts&, Templates* out) {
   for (std::size_t k = 0; k < kForms.size(); ++k)
-    ListGrid({.shapes = ShapesOf(kForms[k].step),
-              .shape_name = kForms[k].name,
-              .form = static_cast<int>(k)},
-             out);
+    ListGrid(
+        {.shapes = ShapesOf(kForms[k]), .shape_name = kForms[k].name, .form = static_cast<int>(k)},
+        out);
 }
 
 // Templates for any whole number of hundredths, and for bits beyond the usual.
@@ -51,7 +64,7 @@ void Glance(Templates* out) {
   for (int k = 1; k <= kHundredthsMax; ++k) hundredths.push_back(k / 100.0);
   for (const double k : {7, 8, 15, 16, 17}) bits.push_back(k);
   for (std::size_t k = 0; k < kForms.size(); ++k) {
-    if (kForms[k].rounding == Rounding::kCutMove || kForms[k].step == Step::kMotorTurns) continue;
+    if (IsCut(kForms[k]) || kForms[k].step == Step::kMotorTurns) continue;
     ListGrid({.shapes = kForms[k].step == Step::kBits ? bits : hundredths,
               .shape_name = kForms[k].name,
               .form = static_cast<int>(k)},
@@ -62,7 +75,7 @@ void Glance(Templates* out) {
 // The template of a step of any size.
 void OfPeriod(double period_deg, Templates* out) {
   for (std::size_t k = 0; k < kForms.size(); ++k)
-    if (kForms[k].step == Step::kDegrees && kForms[k].rounding != Rounding::kCutMove)
+    if (kForms[k].step == Step::kDegrees && !IsCut(kForms[k]))
       ListGrid({.shapes = {period_deg}, .shape_name = kForms[k].name, .form = static_cast<int>(k)},
                out);
 }
@@ -79,10 +92,12 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
     if (track.restarts[i]) behind_deg = 0;
     const double q = track.cmd_deg[axis][i];
     const double move = track.step_deg[axis][i];
-    behind_deg += std::trunc(move / step_deg) * step_deg - move;
+    behind_deg += kind.rounding == Rounding::kCutMean && move != 0
+                      ? -Direction(move) * std::min(step_deg / 2, std::abs(move))
+                      : std::trunc(move / step_deg) * step_deg - move;
     const bool down = kind.rounding == Rounding::kDown;
     const double steps = down ? std::floor(q / step_deg) : std::round(q / step_deg);
-    const double error = kind.rounding == Rounding::kCutMove ? behind_deg : steps * step_deg - q;
+    const double error = IsCut(kind) ? behind_deg : steps * step_deg - q;
     errors->angle_deg[axis][i] += amplitude[0] * error;
   }
 }

@@ -26,10 +26,10 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const bool upper = form.form == 0 || form.form == 2, slips = form.form >= 2;
   double lost_deg = 0;
   for (std::size_t i = 0; i < track.moves; ++i) {
-    if (track.restarts[i]) lost_deg = 0;
+    if (track.restarts[i] || track.IsBeginning(i)) lost_deg = 0;
     const double q = track.cmd_deg[axis][i] + lost_deg;
     const double beyond_deg = upper ? -std::max(q - (unit.max_deg[axis] - form.shape), 0.0)
-                                             : std::max(unit.min_deg[axis] + form.shape - q, 0.0);
+                                    : std::max(unit.min_deg[axis] + form.shape - q, 0.0);
     if (slips) lost_deg += beyond_deg;
     errors->angle_deg[axis][i] += amplitude[0] * (slips ? lost_deg : beyond_deg);
   }

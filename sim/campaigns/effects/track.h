@@ -51,7 +51,7 @@ struct CampaignFacts {
   const Campaign* campaign = nullptr;
   Exposures exposures;
   std::map<std::string, FilledColumn, std::less<>> columns;
-  std::vector<char> restarts;       // Shape: (rows): the unit's history begins anew here
+  std::vector<char> restarts;  // Shape: (rows): the unit's history begins anew here
   // Shape: (rows), or empty where no row is: the loop was closed before the move (closed_loop.h).
   std::vector<char> closed;
   std::vector<double> step_deg[2];  // Shape: (rows): as commanded, wraps of whole turns undone
