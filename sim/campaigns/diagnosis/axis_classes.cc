@@ -29,15 +29,22 @@ struct SeenTurn {
   double asked_deg = 0, made_deg = 0, at_deg = 0;
 };
 
-// Median of the shares that moves of one direction made of what they were asked.
+// The share of what they were asked that moves of one direction made: the line through zero from
+// which their turns are off by the least sum of distances. Long moves tell it best.
 std::optional<double> ScaleOf(const std::vector<SeenTurn>& turns, double sign) {
-  std::vector<double> shares;
+  std::vector<std::pair<double, double>> shares;  // with the angles asked
+  double all = 0;
   for (const SeenTurn& turn : turns)
     if (turn.asked_deg * sign >= kLong_deg &&
         std::abs(turn.made_deg) >= kStallShare * turn.asked_deg * sign)
-      shares.push_back(turn.made_deg / turn.asked_deg);
+      shares.emplace_back(turn.made_deg / turn.asked_deg, std::abs(turn.asked_deg)),
+          all += std::abs(turn.asked_deg);
   if (shares.empty()) return std::nullopt;
-  return Median(std::move(shares));
+  std::ranges::sort(shares);
+  double below = 0;
+  for (const auto& [share, asked_deg] : shares)
+    if ((below += asked_deg) >= all / 2) return share;
+  return shares.back().first;
 }
 
 AxisClass ClassOf(const AxisReport& axis, std::size_t long_moves) {

@@ -21,6 +21,7 @@
 #include "sim/campaigns/diagnosis/next_moves.h"
 #include "sim/campaigns/diagnosis/outliers.h"
 #include "sim/campaigns/diagnosis/patch.h"
+#include "sim/campaigns/diagnosis/plain_geometry.h"
 #include "sim/campaigns/diagnosis/polished.h"
 #include "sim/campaigns/diagnosis/remarks.h"
 #include "sim/campaigns/diagnosis/rotors.h"
@@ -324,6 +325,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   Diagnosis diagnosis;
   options.progress(0, "reading the moves");
   const RepeatedPlaces repeated = ForgetRepeatedPlaces(&campaign);
+  campaign.units = FindCoordinatorsGeometry(campaign);
   CampaignFacts facts = MakeFacts(campaign);
   DescribeRows(repeated, facts, &diagnosis);
   std::vector<char> aside;

@@ -57,8 +57,8 @@ void TakeRows(Fit* fit) {
 }
 
 // Errors that are large in a way that no geometry explains leave the table's as it is.
-void StartNearTable(Fit* fit) {
-  fit->geometry_is = GeometryIs::kNearTable;
+void StartNearTable(GeometryIs where, Fit* fit) {
+  fit->geometry_is = where;
   fit->model.large_errors = true;
   fit->noise.fitted = false;
   TakeRows(fit);
@@ -84,7 +84,7 @@ Fit StartFit(const CampaignFacts& facts, CampaignModel model, std::vector<char> 
   fit.noise.least_um = LeastNoise_um(*facts.campaign, FindPlaceSteps(*facts.campaign));
   fit.noise.unit_factor.assign(fit.model.units.size(), 1);
   if (!facts.closed.empty()) {
-    StartNearTable(&fit);
+    StartNearTable(GeometryIs::kKnown, &fit);
     return fit;
   }
   const std::vector<CampaignUnit> table = fit.model.units;
@@ -99,7 +99,7 @@ Fit StartFit(const CampaignFacts& facts, CampaignModel model, std::vector<char> 
   SettleFit(&fit, 3);
   if (MedianMiss_um(fit) > kFar_um) {
     fit.model.units = table;
-    StartNearTable(&fit);
+    StartNearTable(GeometryIs::kNearTable, &fit);
   }
   return fit;
 }

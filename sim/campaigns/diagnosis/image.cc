@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/chances.h"
 #include "sim/campaigns/diagnosis/image_followed.h"
 #include "sim/campaigns/diagnosis/term_trace.h"
@@ -59,6 +60,7 @@ std::vector<Image> Normals(const Fit& fit) {
 
 // Agreement of neighbours' whitened residuals, exposure by exposure, in standard deviations.
 double NeighboursAgree(const Fit& fit, double* size_um) {
+  constexpr double kWeightLeast = 0.5;  // of a row 6 standard deviations off
   const Campaign& campaign = *fit.facts->campaign;
   const std::size_t units = campaign.units.size();
   std::vector<std::vector<double>> of(units);
@@ -67,7 +69,9 @@ double NeighboursAgree(const Fit& fit, double* size_um) {
     std::vector<double> xy(2 * exposures, 0);
     const WhiteUnit w = Whiten(fit, unit);
     for (std::size_t k = 0; k < w.moves.size(); ++k) {
-      const std::size_t e = fit.facts->exposures.of_row[w.track.first_row + w.moves[k]];
+      const std::size_t row = w.track.first_row + w.moves[k];
+      if (fit.weight[row] < kWeightLeast) continue;  // an outlier, which others may be like
+      const std::size_t e = fit.facts->exposures.of_row[row];
       xy[2 * e] = w.y[static_cast<Eigen::Index>(2 * k)];
       xy[2 * e + 1] = w.y[static_cast<Eigen::Index>(2 * k + 1)];
     }
@@ -141,16 +145,25 @@ struct Motion {
   }
 };
 
+// Whether a camera can move so: an image that shrinks or turns by more is one of false spots. A
+// camera that is focused anew scales by some thousandths; half and twice of it: the same images.
+bool IsPossible(const Vector4& motion, double radius_mm) {
+  constexpr double kMost = 0.01;  // of the scale; radians of turn
+  return motion.tail<2>().cwiseAbs().maxCoeff() <= kMost * radius_mm * kUmPerMm;
+}
+
 Motion FindMotion(const Fit& fit) {
   const std::vector<Image> images = Normals(fit);
   Motion motion;
   motion.found.assign(images.size(), Vector4::Zero());
   for (std::size_t e = 0; e < images.size(); ++e) {
     if (images[e].rows < 6) continue;
-    motion.seen.push_back(e);
     const Matrix4 normal = images[e].normal.topLeftCorner<4, 4>();
     const Matrix4 covariance = normal.ldlt().solve(Matrix4::Identity());
-    motion.found[e] = covariance * images[e].right.head<4>();
+    const Vector4 found = covariance * images[e].right.head<4>();
+    if (!IsPossible(found, fit.facts->radius_mm)) continue;
+    motion.seen.push_back(e);
+    motion.found[e] = found;
     motion.square += motion.found[e].cwiseAbs2();
     motion.noise += covariance.diagonal();
     motion.chi_square += motion.found[e].dot(images[e].right.head<4>());

@@ -333,6 +333,10 @@ std::vector<double> LengthsOf(const std::vector<const WhiteRow*>& rows) {
   return squares;
 }
 
+// Air blurs by 8 um at worst, and cameras measure to 1 um. An exposure that is off by more is one
+// of false spots, whose rows are outliers. Half and twice of it: the same.
+constexpr double kExposureFactorMost = 10;
+
 // Factors are about 1; their common part is the fleet's noise. A unit or an exposure without any
 // residual has a factor, too: the least that numbers allow. Half or twice of it decides nothing, as
 // a place's noise has a floor of its own (rest_filter.h).
@@ -342,7 +346,8 @@ void Normalise(Noise* noise) {
     for (double& factor : *factors) factor = std::max(factor, kFactorLeast);
   if (!noise->exposure_factor.empty()) {
     const double usual = Median(noise->exposure_factor);
-    for (double& factor : noise->exposure_factor) factor /= usual;
+    for (double& factor : noise->exposure_factor)
+      factor = std::clamp(factor / usual, 1 / kExposureFactorMost, kExposureFactorMost);
     noise->place_um *= usual;
   }
   const double usual = Median(noise->unit_factor);

@@ -93,4 +93,26 @@ CampaignUnit FindPlain(const std::vector<PlainRow>& rows, const CampaignUnit& ta
   return best;
 }
 
+std::vector<CampaignUnit> FindCoordinatorsGeometry(const Campaign& campaign) {
+  constexpr std::size_t kRowsMin = 8;
+  constexpr double kAgree_mm = 0.05;  // more is no rounding of angles, and no noise of a camera
+  const std::span<const double> closed = campaign.Find("from_measured");
+  const std::span<const double> rehomed = campaign.Find("rehomed");
+  std::vector<CampaignUnit> units = campaign.units;
+  for (std::size_t unit = 0; unit < units.size() && !closed.empty(); ++unit) {
+    std::vector<PlainRow> rows;
+    for (std::size_t row = campaign.first_row[unit] + 1; row < campaign.first_row[unit + 1]; ++row)
+      if (closed[row] > 0.5 && (rehomed.empty() || !(rehomed[row] > 0.5)) &&
+          std::isfinite(campaign.x_mm[row - 1]))
+        rows.push_back({campaign.from_deg[kTheta][row], campaign.from_deg[kPhi][row],
+                        campaign.x_mm[row - 1], campaign.y_mm[row - 1]});
+    if (rows.size() < kRowsMin) continue;
+    const CampaignUnit found = FindPlain(rows, units[unit]);
+    // The table's geometry is the coordinator's where it agrees.
+    if (MedianMiss(rows, units[unit]) > kAgree_mm && MedianMiss(rows, found) < kAgree_mm)
+      units[unit] = found;
+  }
+  return units;
+}
+
 }  // namespace focalfleet::sim

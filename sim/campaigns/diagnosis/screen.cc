@@ -116,7 +116,9 @@ std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, s
 std::optional<UnknownFound> FindOddExposures(const Fit& fit, double family_wise) {
   constexpr std::size_t kExposuresMin = 12;  // of which most have to be alike
   constexpr double kMedianSquare = 0.455;    // of a standard normal number
-  if (fit.facts->exposures.size() < kExposuresMin) return std::nullopt;
+  // Motion of the image is what all units do alike in an exposure, and looks like their angles.
+  if (fit.facts->exposures.size() < kExposuresMin || !fit.model.exposures.empty())
+    return std::nullopt;
   Templates looks;
   for (const int channel : {kThetaAngle, kPhiAngle})
     looks.push_back({.effect = &EmpiricalCurve(),  // the cosine of order 0: one angle for all

@@ -59,6 +59,7 @@ inline GeometryCheck CheckGeometry(const CampaignUnit& described, const Campaign
 enum class GeometryIs {
   kAnywhere,   // zeros have any value
   kNearTable,  // the coordinator has used the table as it is: it is off by little
+  kKnown,      // the coordinator's own words tell it
 };
 
 /// Weights of the prior: what the moves do not show stays as in units.csv. An axis that does not
@@ -69,13 +70,16 @@ inline StaticVector StaticPriorWeights(GeometryIs where, const bool (&moves)[2])
   // them change what few moves show.
   constexpr double kNearBase_mm = 0.1, kNearArm_mm = 0.06, kNearZero_deg = 1;
   constexpr double kFixed = 1e-6;
-  const bool near = where == GeometryIs::kNearTable;
+  // The median of a campaign's places tells a geometry so well.
+  constexpr double kKnown_mm = 0.005, kKnown_deg = 0.05;
+  const bool near = where != GeometryIs::kAnywhere;
+  const bool known = where == GeometryIs::kKnown;
   StaticVector spread;
-  spread.head<2>().setConstant(near ? kNearBase_mm : kBase_mm);
+  spread.head<2>().setConstant(known ? kKnown_mm : near ? kNearBase_mm : kBase_mm);
   for (const std::size_t axis : {kTheta, kPhi}) {
     const auto a = static_cast<Eigen::Index>(axis);
-    spread[2 + a] = moves[axis] ? (near ? kNearArm_mm : kArm_mm) : kFixed;
-    spread[4 + a] = moves[axis] ? (near ? kNearZero_deg : kZero_deg) : kFixed;
+    spread[2 + a] = moves[axis] ? (known ? kKnown_mm : near ? kNearArm_mm : kArm_mm) : kFixed;
+    spread[4 + a] = moves[axis] ? (known ? kKnown_deg : near ? kNearZero_deg : kZero_deg) : kFixed;
   }
   return spread.array().square().inverse();
 }
