@@ -43,7 +43,9 @@ Effect MakeThermalArmGrowth() {
               "The error is along the arms and follows the unit's temperature.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          // Without temperatures arms that grow over a night are warmed by their motors.
+          .passes_for = {"self_heating"}};
 }
 
 }  // namespace focalfleet::sim
