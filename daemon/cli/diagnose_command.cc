@@ -21,6 +21,7 @@
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
 #include "protocol/base/rng.h"
+#include "sim/campaigns/diagnosis/plain_geometry.h"
 #include "sim/campaigns/diagnosis/planted.h"
 #include "sim/campaigns/effects/registry.h"
 
@@ -176,7 +177,9 @@ Result<sim::Campaign> Predicted(const Context& context, const SimulateCampaignOp
   FOCALFLEET_TRY_ASSIGN(MeasuredCampaign measured, ReadMeasuredCampaign(context, options.of));
   sim::Campaign& campaign = measured.campaign;
   FOCALFLEET_TRY_ASSIGN(const ModelFile file, ReadModelFor(campaign, options.model));
-  const sim::Places places = sim::Predict(file.model, sim::MakeFacts(campaign), OnThreads(0));
+  sim::Campaign begun = campaign;  // by the geometry that its closed loops were turned with
+  begun.units = sim::FindCoordinatorsGeometry(campaign);
+  const sim::Places places = sim::Predict(file.model, sim::MakeFacts(begun), OnThreads(0));
   Rng rng = Rng::Stream(options.planted.seed, "predicted");
   const auto measure = [&](double place_mm) {
     return place_mm + 1e-3 * options.planted.noise_um * rng.Normal();

@@ -58,6 +58,7 @@ AxisClass ClassOf(const AxisReport& axis, std::size_t long_moves) {
   double sum = 0, directions = 0;
   for (const std::optional<double>& scale : {axis.scale_cw, axis.scale_ccw})
     if (scale) sum += *scale, directions += 1;
+  if (directions == 0) return AxisClass::kSlipping;
   const bool opposite =
       axis.scale_cw && axis.scale_ccw && (*axis.scale_cw - 1) * (*axis.scale_ccw - 1) < 0 &&
       std::min(std::abs(*axis.scale_cw - 1), std::abs(*axis.scale_ccw - 1)) > kHealthyWithin;

@@ -8,6 +8,7 @@
 #include "protocol/base/rng.h"
 #include "sim/campaigns/diagnosis/chances.h"
 #include "sim/campaigns/diagnosis/outliers.h"
+#include "sim/campaigns/diagnosis/plain_geometry.h"
 #include "sim/campaigns/effects/empirical.h"
 
 namespace focalfleet::sim {
@@ -188,6 +189,7 @@ ModelComparison CompareModels(const ModelPair& models, const Campaign& given,
   ModelComparison out;
   Campaign campaign = given;
   const RepeatedPlaces repeated = ForgetRepeatedPlaces(&campaign);
+  campaign.units = FindCoordinatorsGeometry(campaign);
   const CampaignFacts facts = MakeFacts(campaign);
   std::vector<char> aside;
   out.left_out = FindBeforeFit(facts, repeated, &aside).why;

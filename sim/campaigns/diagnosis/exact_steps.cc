@@ -85,7 +85,7 @@ std::vector<Change> StoppedShort(const UnitRows& rows, std::size_t move) {
   constexpr std::size_t kRowsMin = 4, kRowsMax = 60;
   constexpr double kLeast_deg = 0.1;
   std::vector<double> off[2];
-  const std::size_t end = EndOfHistory(rows.track, move);
+  const std::size_t end = EndOfStep(rows.track, move);
   for (std::size_t i = move; i < end && off[0].size() < kRowsMax; ++i) {
     if (!std::isfinite(rows.x_mm[i])) continue;
     const AnglesOff at = AnglesOffAt(rows, i);
@@ -152,7 +152,7 @@ Change BestChange(const UnitRows& rows, ChangeKind kind, double gain_min) {
   const Costs costs = CostsOf(rows);
   Change best;
   for (std::size_t move = 0; move < rows.track.moves; ++move) {
-    const std::size_t end = EndOfHistory(rows.track, move);
+    const std::size_t end = EndOfStep(rows.track, move);
     for (Change& change : ChangesIn(rows, move, kind)) {
       const double enough = std::max(best.gained, gain_min) - kRounding;
       double gained = 0;
@@ -184,7 +184,7 @@ void FitGeometry(const CampaignUnit& table, UnitRows* rows) {
 
 // Applies the change from its move on, until the unit is homed.
 void Take(const Change& change, UnitRows* rows) {
-  const std::size_t end = EndOfHistory(rows->track, change.move);
+  const std::size_t end = EndOfStep(rows->track, change.move);
   for (std::size_t i = change.move; i < end; ++i)
     for (const std::size_t axis : {kTheta, kPhi}) rows->added_deg[axis][i] += change.by_deg[axis];
 }
@@ -198,9 +198,9 @@ bool IsFar(const UnitRows& rows, std::size_t i, const double by_deg[2], double f
 Change LongestRun(const UnitRows& rows, std::size_t since, std::size_t at, double far_mm) {
   Change best;
   std::size_t longest = 0;
-  const std::size_t end = EndOfHistory(rows.track, at);
+  const std::size_t end = EndOfStep(rows.track, at);
   for (std::size_t move = since; move <= at; ++move) {
-    if (EndOfHistory(rows.track, move) != end) continue;  // a homing has undone it
+    if (EndOfStep(rows.track, move) != end) continue;  // a homing has undone it
     for (const Change& change : ChangesIn(rows, move, ChangeKind::kInOrder)) {
       std::size_t run = 0;
       for (std::size_t i = at; i < end; ++i) {

@@ -52,7 +52,11 @@ void TakeFarAngles(const UnitTrack& track, const std::vector<double>& theta_deg,
     // An axis that is a whole turn off is at its place.
     const bool is_near =
         std::hypot((*x_um)[row], (*y_um)[row]) < kFar_um && std::abs(off_deg) < 180;
-    if (!std::isfinite((*x_um)[row]) || is_near) continue;
+    if (!std::isfinite((*x_um)[row])) continue;
+    if (is_near) {
+      off_deg = 0;
+      continue;
+    }
     const AnglesToPlace at =
         FindAngles(*track.unit, campaign.x_mm[row], campaign.y_mm[row], theta_deg[i], phi_deg[i]);
     if (!at.reached) continue;

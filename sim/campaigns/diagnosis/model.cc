@@ -17,13 +17,9 @@ void AddEvents(const CampaignModel& model, std::size_t unit, const UnitTrack& tr
                PoseErrors* errors) {
   for (const EventTerm& event : model.events) {
     if (event.unit != unit) continue;
-    for (std::size_t i = event.row - track.first_row; i < track.moves; ++i) {
-      const bool first = i == event.row - track.first_row;
-      // A loop that was closed begins where the step has brought the axis.
-      const bool closed = !track.facts->closed.empty() && track.facts->closed[track.first_row + i];
-      if (!first && (!event.stays || track.restarts[i] != 0 || closed)) break;
-      errors->angle_deg[event.axis][i] += event.step_deg;
-    }
+    const std::size_t begin = event.row - track.first_row;
+    const std::size_t end = event.stays ? EndOfStep(track, begin) : begin + 1;
+    for (std::size_t i = begin; i < end; ++i) errors->angle_deg[event.axis][i] += event.step_deg;
   }
 }
 
@@ -95,10 +91,14 @@ AmplitudeSummary Summarise(const ModelTerm& term) {
       const double a = term.amplitude[group * c + k], sigma = term.sigma[group * c + k];
       square += a * a, sigma2 += sigma * sigma / static_cast<double>(c);
     }
-    // Without an error there is no data.
-    if (sigma2 > 0) own.push_back({c == 1 ? term.amplitude[group] : std::sqrt(square), sigma2});
+    own.push_back({c == 1 ? term.amplitude[group] : std::sqrt(square), sigma2});
   }
+  // A group without an error has no data. Where none has one, nothing is known of the errors.
+  const bool known = std::ranges::any_of(own, [](const Group& group) { return group.sigma2 > 0; });
+  if (known) std::erase_if(own, [](const Group& group) { return !(group.sigma2 > 0); });
   if (own.empty()) return {};
+  if (!known)
+    for (Group& group : own) group.sigma2 = 1;
   const auto mean_of = [&](double between2, const auto& value) {
     double sum = 0, weight = 0;
     for (const Group& group : own)
@@ -113,9 +113,11 @@ AmplitudeSummary Summarise(const ModelTerm& term) {
     weight += 1 / group.sigma2, weight2 += 1 / (group.sigma2 * group.sigma2);
   }
   const double freedom = static_cast<double>(own.size()) - 1;
+  const double room = weight - weight2 / weight;  // none where one group has all of the weight
   const double between2 =
-      freedom > 0 ? std::max((scatter - freedom) / (weight - weight2 / weight), 0.0) : 0;
-  const AmplitudeSummary mean = mean_of(between2, itself);
+      freedom > 0 && room > 1e-9 * weight ? std::max((scatter - freedom) / room, 0.0) : 0;
+  AmplitudeSummary mean = mean_of(between2, itself);
+  if (!known) mean.sigma = 0;
   if (c > 1) return mean;
   // Groups of either sign have no mean to speak of, and a size.
   const AmplitudeSummary square =

@@ -55,8 +55,8 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   cause.ci95[0] = amplitude.value - 1.96 * amplitude.sigma;
   cause.ci95[1] = amplitude.value + 1.96 * amplitude.sigma;
   const auto [low, high] = RangeOfAmplitude(effect);
-  cause.at_bound =
-      std::ranges::any_of(term.amplitude, [&](double one) { return one <= low || one >= high; });
+  cause.at_bound = std::ranges::any_of(
+      term.amplitude, [&](double one) { return (low < 0 && one <= low) || one >= high; });
   const TermTrace trace = TraceOf(fit, term);
   // No error moves a fibre farther than across its patrol disc.
   double disc_um = 0;

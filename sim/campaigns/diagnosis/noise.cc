@@ -393,8 +393,9 @@ std::vector<double> DrawTogether(const std::vector<LogVariance>& estimates) {
 
 // The variance of the camera's noise in an exposure, by its present factor.
 LogVariance ExposureVariance(const std::vector<const WhiteRow*>& rows, double factor) {
-  constexpr double kLeast = 0.05;  // of the present variance: less is not resolved in one step
-  if (rows.empty()) return {};
+  constexpr double kLeast = 0.05;      // of the present variance: less is not resolved in one step
+  constexpr std::size_t kRowsMin = 6;  // fewer tell next to nothing beside what they have alike
+  if (rows.size() < kRowsMin) return {};
   const auto n = static_cast<double>(rows.size());
   double share = 0;
   for (const WhiteRow* row : rows) share += row->camera_share / n;

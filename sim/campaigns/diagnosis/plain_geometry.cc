@@ -106,11 +106,10 @@ std::vector<CampaignUnit> FindCoordinatorsGeometry(const Campaign& campaign) {
           std::isfinite(campaign.x_mm[row - 1]))
         rows.push_back({campaign.from_deg[kTheta][row], campaign.from_deg[kPhi][row],
                         campaign.x_mm[row - 1], campaign.y_mm[row - 1]});
-    if (rows.size() < kRowsMin) continue;
-    const CampaignUnit found = FindPlain(rows, units[unit]);
     // The table's geometry is the coordinator's where it agrees.
-    if (MedianMiss(rows, units[unit]) > kAgree_mm && MedianMiss(rows, found) < kAgree_mm)
-      units[unit] = found;
+    if (rows.size() < kRowsMin || MedianMiss(rows, units[unit]) <= kAgree_mm) continue;
+    const CampaignUnit found = FindPlain(rows, units[unit]);
+    if (MedianMiss(rows, found) < kAgree_mm) units[unit] = found;
   }
   return units;
 }

@@ -117,7 +117,9 @@ std::optional<UnknownFound> FindOddExposures(const Fit& fit, double family_wise)
   constexpr std::size_t kExposuresMin = 12;  // of which most have to be alike
   constexpr double kMedianSquare = 0.455;    // of a standard normal number
   // Motion of the image is what all units do alike in an exposure, and looks like their angles.
-  if (fit.facts->exposures.size() < kExposuresMin || !fit.model.exposures.empty())
+  constexpr std::size_t kUnitsMin = 6;  // fewer are alike by a single outlier
+  if (fit.facts->exposures.size() < kExposuresMin || fit.model.units.size() < kUnitsMin ||
+      !fit.model.exposures.empty())
     return std::nullopt;
   Templates looks;
   for (const int channel : {kThetaAngle, kPhiAngle})
@@ -127,13 +129,17 @@ std::optional<UnknownFound> FindOddExposures(const Fit& fit, double family_wise)
                      .label = "exposure by exposure",
                      .covariate = std::string(kOrder)});
   const ScorePass pass = ScoreTemplates(fit, looks);
+  std::vector<std::size_t> rows(fit.facts->exposures.size(), 0);
+  for (std::size_t row = 0; row < fit.weight.size(); ++row)
+    if (fit.Used(row)) ++rows[fit.facts->exposures.of_row[row]];
   std::optional<UnknownFound> clearest;
   for (std::size_t k = 0; k < looks.size(); ++k) {
     std::vector<double> squares;
     double sum = 0, weight = 0;
     for (std::size_t e = 0; e < pass.scores[k].exposure_b.size(); ++e) {
       const double b = pass.scores[k].exposure_b[e], g = pass.scores[k].exposure_g[e];
-      if (g > 0) squares.push_back(b * b / g), sum += b * b / g, weight += g;
+      if (g > 0 && rows[e] >= kUnitsMin)
+        squares.push_back(b * b / g), sum += b * b / g, weight += g;
     }
     if (squares.size() < kExposuresMin) continue;
     // Errors of most exposures that are alike, too, are noise that units share.

@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t kSlipsOfUnitMax = 40;
 constexpr double kTurnsMax = 20;
+constexpr double kBeside = 0.25;  // of a turn, either way: half of all steps by chance
 
 // A unit's whitened residuals beside its geometry, and what steps make of them.
 class StepRows {
@@ -27,7 +28,7 @@ class StepRows {
   /// The trace of a step by one degree in `move`, until the next homing.
   [[nodiscard]] Eigen::VectorXd Column(std::size_t axis, std::size_t move, bool stays) const {
     Eigen::VectorXd column = Eigen::VectorXd::Zero(y_.size());
-    const std::size_t end = stays ? EndOfHistory(white_.track, move) : move + 1;
+    const std::size_t end = stays ? EndOfStep(white_.track, move) : move + 1;
     for (std::size_t k = 0; k < rows(); ++k) {
       if (white_.moves[k] < move || white_.moves[k] >= end) continue;
       for (std::size_t xy = 0; xy < 2; ++xy)
@@ -36,6 +37,12 @@ class StepRows {
     white_.Apply(column.data());
     geometry_.Remove(&column);
     return column;
+  }
+  /// Whether the axis moves after one move and up to another.
+  [[nodiscard]] bool Moves(std::size_t axis, std::size_t after, std::size_t to) const {
+    for (std::size_t move = after + 1; move <= to; ++move)
+      if (white_.track.step_deg[axis][move] != 0) return true;
+    return false;
   }
   [[nodiscard]] const Eigen::VectorXd& left() const { return y_; }
   void Take(const Eigen::VectorXd& column, double step_deg) { y_ -= step_deg * column; }
@@ -70,13 +77,15 @@ Slip BestSlip(const StepRows& rows) {
     const double turn = 360 / rows.track().unit->gear[axis];
     for (std::size_t k = 1; k < rows.rows(); ++k) {
       const std::size_t from = rows.move(k - 1), to = rows.move(k);
-      if (EndOfHistory(rows.track(), from) <= to) continue;
+      if (EndOfHistory(rows.track(), from) <= to || !rows.Moves(axis, from, to)) continue;
       const Eigen::VectorXd column = rows.Column(axis, to, true);
       const double g = column.squaredNorm(), b = column.dot(rows.left());
       const double turns =
           std::clamp(std::round(b / std::max(g, 1e-300) / turn), -kTurnsMax, kTurnsMax);
       const double step_deg = turns * turn, log_ratio = step_deg * b - step_deg * step_deg * g / 2;
-      if (turns == 0 || log_ratio <= best.log_ratio) continue;
+      // A step that lies between two numbers of turns is none of a rotor.
+      const bool is_whole = std::abs(b / std::max(g, 1e-300) - step_deg) <= kBeside * turn;
+      if (turns == 0 || !is_whole || log_ratio <= best.log_ratio) continue;
       if (const std::size_t move = MoveAgainst(rows.track(), axis, from, to, turns); move != 0)
         best = {axis, move, step_deg, log_ratio, column};
     }

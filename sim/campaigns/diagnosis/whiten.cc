@@ -133,9 +133,14 @@ Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white) {
         {t[2], t[3]}};
     const auto at = static_cast<Eigen::Index>(2 * k);
     for (Eigen::Index c = 0; c < 6; ++c) out(at, c) = columns[c][0], out(at + 1, c) = columns[c][1];
-    if (!IsClosed(track, i)) continue;
+    // The coordinator counts on from where the loop was closed last.
+    std::size_t begun = i;
+    while (begun > 0 && track.beginnings != nullptr && track.restarts[begun] == 0 &&
+           !IsClosed(track, begun))
+      --begun;
+    if (!IsClosed(track, begun)) continue;
     for (Eigen::Index c = 0; c < 6; ++c) {
-      const auto turn = TurnAtBeginning(track, i, c);
+      const auto turn = TurnAtBeginning(track, begun, c);
       for (Eigen::Index xy = 0; xy < 2; ++xy)
         out(at + xy, c) -= t[xy] * turn[0] + t[2 + xy] * turn[1];
     }

@@ -386,6 +386,15 @@ std::size_t EndOfHistory(const UnitTrack& track, std::size_t move) {
   return end;
 }
 
+std::size_t EndOfStep(const UnitTrack& track, std::size_t move) {
+  const std::vector<char>& closed = track.facts->closed;
+  std::size_t end = move + 1;
+  while (end < track.moves && track.restarts[end] == 0 &&
+         (closed.empty() || closed[track.first_row + end] == 0))
+    ++end;
+  return end;
+}
+
 namespace {
 
 void SizePoses(UnitTrack* track) {

@@ -99,6 +99,10 @@ struct UnitTrack {
 /// The index after the last move of the history (from homing to homing) that `move` belongs to.
 std::size_t EndOfHistory(const UnitTrack& track, std::size_t move);
 
+/// The index after the last move that a step of the count in `move` changes: a homing undoes it,
+/// and a loop that is closed begins where it has brought the axis.
+std::size_t EndOfStep(const UnitTrack& track, std::size_t move);
+
 /// `geometry` is the unit with the geometry to use; its arrays are read as long as the track lives.
 UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const CampaignUnit& geometry);
 

@@ -109,7 +109,7 @@ TEST(Events, NoiseOfAFoldedArmIsNoSlip) {
   }
   const CampaignFacts facts = MakeFacts(campaign);
   Fit fit = StaticFit(facts);
-  EXPECT_EQ(AddEvents(&fit), 0u);
+  EXPECT_EQ(AddEvents(0.01, &fit), 0u);
 }
 
 TEST(Events, ALastMoveThatDidNotHappenIsALostCommand) {

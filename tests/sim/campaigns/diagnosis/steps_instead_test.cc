@@ -67,7 +67,7 @@ std::vector<std::string_view> StepsInsteadOf(const char* cause, std::size_t of_u
   SettleFit(&fit, 3);
   Selection selection;
   selection.accepted.resize(1);
-  CompareWithSteps(fit, &selection);
+  CompareWithSteps(fit, 0.01, &selection);
   std::vector<std::string_view> names;
   for (const Rival& rival : selection.accepted[0].rivals) names.push_back(rival.cause);
   return names;
