@@ -15,12 +15,26 @@ constexpr double kOutlier = 6;  // whitened length by the final model
 
 // The fold of each row. Blocks of neighbouring exposures are dealt out in turn. They are short, so
 // that each fold has its share of every condition: of a temperature, of an elevation, of a homing.
+// Where the zeros of homings are free, the blocks are homings: a few moves do not tell zeros that
+// the others are judged by.
 std::vector<std::size_t> FoldsOf(const Fit& fit, std::string* how) {
   constexpr std::size_t kBlocksOfFold = 10;  // half or twice as many: the same share of conditions
+  const Campaign& campaign = *fit.facts->campaign;
+  std::vector<std::size_t> fold(campaign.rows());
+  if (!fit.model.homing_zero_deg[kTheta].empty()) {
+    *how = "5 folds of whole homings; each fold predicted from the other four";
+    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+      std::size_t homing = 0;
+      for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+        if (fit.facts->restarts[row] != 0 && row != campaign.first_row[unit]) ++homing;
+        fold[row] = homing % kFolds;
+      }
+    }
+    return fold;
+  }
   *how = "5 folds of blocks of exposures; each fold predicted from the other four";
   const std::size_t exposures = fit.facts->exposures.size();
   const std::size_t block = std::max<std::size_t>(1, exposures / (kBlocksOfFold * kFolds));
-  std::vector<std::size_t> fold(fit.facts->campaign->rows());
   for (std::size_t row = 0; row < fold.size(); ++row)
     fold[row] = fit.facts->exposures.of_row[row] / block % kFolds;
   return fold;

@@ -1,7 +1,7 @@
 // The gain of the extended model is measured on moves that no fit has seen. The campaign's
 // exposures are split into folds. For each fold the static geometry alone, and the geometry with
-// the model's terms, are fitted to the others and judged on it. Folds are dealt out in short blocks,
-// so that each has its share of every condition.
+// the model's terms, are fitted to the others and judged on it. Folds are dealt out in short
+// blocks, so that each has its share of every condition.
 #pragma once
 
 #include "sim/campaigns/diagnosis/diagnosis.h"

@@ -368,8 +368,8 @@ struct LogVariance {
 // whose median is 2 ln 2 and whose density there is a quarter.
 constexpr double kMedianError = 4 / (kMedianSquare * kMedianSquare);
 
-// Draws estimates to their median by what they scatter beyond their errors (empirical Bayes). One
-// that is far beyond both is another kind, and stays.
+// Draws estimates to their median by what they scatter beyond their errors (empirical Bayes). An
+// estimate that is far beyond both is another kind, and stays.
 // Source: Efron, Large-Scale Inference, chapter 1.
 std::vector<double> DrawTogether(const std::vector<LogVariance>& estimates) {
   constexpr double kFar = 3;       // in standard deviations

@@ -22,8 +22,9 @@ CampaignUnit FitPlain(const std::vector<PlainRow>& rows, const CampaignUnit& tab
 CampaignUnit FindPlain(const std::vector<PlainRow>& rows, const CampaignUnit& table);
 
 /// The units with the geometry by which the coordinator turned places into angles, where loops were
-/// closed: each move began at angles that it inferred from the place before. No effect has a part in
-/// that. A unit for which too few moves tell it, or whose moves agree on none, stays as it is.
+/// closed. Each move began at angles that it inferred from the place before, so that no effect has
+/// a part in them. A unit for which too few moves tell it, or whose moves agree on none, stays as
+/// it is.
 std::vector<CampaignUnit> FindCoordinatorsGeometry(const Campaign& campaign);
 
 }  // namespace focalfleet::sim

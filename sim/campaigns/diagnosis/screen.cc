@@ -115,46 +115,50 @@ std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, s
 
 std::optional<UnknownFound> FindOddExposures(const Fit& fit, double family_wise) {
   constexpr std::size_t kExposuresMin = 12;  // of which most have to be alike
+  constexpr std::size_t kUnitsMin = 6;       // fewer are alike by a single outlier
   constexpr double kMedianSquare = 0.455;    // of a standard normal number
   // Motion of the image is what all units do alike in an exposure, and looks like their angles.
-  constexpr std::size_t kUnitsMin = 6;  // fewer are alike by a single outlier
-  if (fit.facts->exposures.size() < kExposuresMin || fit.model.units.size() < kUnitsMin ||
-      !fit.model.exposures.empty())
-    return std::nullopt;
-  Templates looks;
-  for (const int channel : {kThetaAngle, kPhiAngle})
-    looks.push_back({.effect = &EmpiricalCurve(),  // the cosine of order 0: one angle for all
-                     .axis = EffectAxis::kNone,
-                     .form = channel,
-                     .label = "exposure by exposure",
-                     .covariate = std::string(kOrder)});
-  const ScorePass pass = ScoreTemplates(fit, looks);
-  std::vector<std::size_t> rows(fit.facts->exposures.size(), 0);
-  for (std::size_t row = 0; row < fit.weight.size(); ++row)
-    if (fit.Used(row)) ++rows[fit.facts->exposures.of_row[row]];
-  std::optional<UnknownFound> clearest;
-  for (std::size_t k = 0; k < looks.size(); ++k) {
-    std::vector<double> squares;
-    double sum = 0, weight = 0;
-    for (std::size_t e = 0; e < pass.scores[k].exposure_b.size(); ++e) {
-      const double b = pass.scores[k].exposure_b[e], g = pass.scores[k].exposure_g[e];
-      if (g > 0 && rows[e] >= kUnitsMin)
-        squares.push_back(b * b / g), sum += b * b / g, weight += g;
+  if (!fit.model.exposures.empty()) return std::nullopt;
+  // The angle that all units of an exposure have alike, as its normal equation.
+  struct Alike {
+    double g[2] = {0, 0}, b[2] = {0, 0};
+    std::size_t rows = 0;
+  };
+  std::vector<Alike> exposures(fit.facts->exposures.size());
+  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
+    const WhiteUnit white = Whiten(fit, unit);
+    for (std::size_t k = 0; k < white.moves.size(); ++k) {
+      Alike& one = exposures[fit.facts->exposures.of_row[white.track.first_row + white.moves[k]]];
+      ++one.rows;
+      const double* w = white.filter[k].w;
+      const auto at = static_cast<Eigen::Index>(2 * k);
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        const double* t = &white.turn_um[4 * k + 2 * axis];
+        const double x = w[0] * t[0] + w[1] * t[1], y = w[1] * t[0] + w[2] * t[1];
+        one.g[axis] += x * x + y * y, one.b[axis] += x * white.y[at] + y * white.y[at + 1];
+      }
     }
+  }
+  std::optional<UnknownFound> clearest;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    std::vector<double> squares;
+    double sum = 0;
+    for (const Alike& one : exposures)
+      if (one.rows >= kUnitsMin && one.g[axis] > 0)
+        squares.push_back(one.b[axis] * one.b[axis] / one.g[axis]), sum += squares.back();
     if (squares.size() < kExposuresMin) continue;
     // Errors of most exposures that are alike, too, are noise that units share.
     const double spread = std::max(Median(squares) / kMedianSquare, 1.0);
     const double most = *std::ranges::max_element(squares) / spread;
-    const double tests = static_cast<double>(looks.size() * squares.size());
-    const double log_p = LogLeastOf(LogChiSquareTail(most, 1), tests);
+    const double log_p =
+        LogLeastOf(LogChiSquareTail(most, 1), 2 * static_cast<double>(squares.size()));
     if (log_p > std::log(kUnknownShare * family_wise)) continue;
     if (clearest && clearest->p_value <= std::exp(log_p)) continue;
-    const double rms_um =
-        fit.noise.typical_um * std::sqrt(sum / (2 * static_cast<double>(pass.values)));
+    const auto rows = static_cast<double>(fit.facts->campaign->rows());
     clearest = UnknownFound{.covariate = std::string(kOrder),
-                            .channel = std::string(ChannelOf(looks[k])),
+                            .channel = axis == kTheta ? "theta angle" : "phi angle",
                             .p_value = std::exp(log_p),
-                            .size_um = rms_um,
+                            .size_um = fit.noise.typical_um * std::sqrt(sum / rows),
                             .delta_log_likelihood = sum / 2};
   }
   return clearest;

@@ -71,9 +71,7 @@ Best BestOf(const ScorePass& pass, const Templates& templates,
     if (best.at != kNoTerm && evidence_of[k].log_evidence < most + kTie &&
         !ComesFirst(templates[k], templates[best.at]))
       continue;
-    if (std::none_of(evidence_of[k].has.begin(), evidence_of[k].has.end(),
-                     [](char h) { return h != 0; }))
-      continue;
+    if (std::ranges::none_of(evidence_of[k].has, [](char h) { return h != 0; })) continue;
     most = evidence_of[k].log_evidence;
     best = {k, evidence_of[k], log_p};
   }

@@ -99,12 +99,15 @@ std::vector<EventTerm> FindSlips(const Fit& fit, std::size_t unit, double family
   std::vector<EventTerm> slips;
   if (!fit.UsesUnit(unit)) return slips;
   StepRows rows(fit, unit);
-  // One slip more of each axis, move and number of turns.
+  // Each axis may slip in each move by any number of turns.
   const double could_be = 2 * static_cast<double>(fit.facts->campaign->rows()) * 2 * kTurnsMax;
   const double least = std::log(could_be / family_wise);
+  // A unit that slips again and again looks like a noisy one until its slips are known. Its noise
+  // is that of the others here.
+  const double factor = std::max(fit.noise.unit_factor[unit], 1.0);
   while (slips.size() < kSlipsOfUnitMax) {
     const Slip slip = BestSlip(rows);
-    if (slip.log_ratio <= least) break;
+    if (slip.log_ratio * factor * factor <= least) break;
     slips.push_back({unit, rows.track().first_row + slip.move, slip.axis, true, slip.step_deg});
     rows.Take(slip.column, slip.step_deg);
   }
@@ -117,7 +120,7 @@ std::vector<double> LogLikelihoodOfEvents(const Fit& fit) {
     const StepRows rows(fit, event.unit);
     const Eigen::VectorXd column =
         rows.Column(event.axis, event.row - rows.track().first_row, event.stays);
-    // What is left without the step is what is left with it, and the step.
+    // The residuals without the step are those with it, and the step.
     const double b = column.dot(rows.left()) + event.step_deg * column.squaredNorm();
     ratios.push_back(std::max(
         event.step_deg * b - event.step_deg * event.step_deg * column.squaredNorm() / 2, 0.0));

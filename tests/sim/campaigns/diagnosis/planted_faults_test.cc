@@ -79,7 +79,7 @@ TEST(PlantedFaults, WhatThereIsNotIsRefused) {
     for (const double amplitude : {0.0, -1.0, 1.5, 1e30})
       EXPECT_THAT(why({.cause = counted, .amplitude = amplitude}), HasSubstr("whole number"));
   EXPECT_THAT(why({.cause = "stiction", .amplitude = 1, .axis = "theta", .form = 99}),
-              HasSubstr("24  theta: until the next move; jumps from, deg, 0.4"));
+              HasSubstr("45  theta: until the next move; jumps from, deg, 0.4"));
 }
 
 }  // namespace

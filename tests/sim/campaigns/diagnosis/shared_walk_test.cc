@@ -39,7 +39,12 @@ TEST(SharedWalk, NorOneThatStepsOnce) {
     SCOPED_TRACE(seed);
     const Diagnosis diagnosis =
         Verdicts(Together([](double share) { return share > 0.6 ? 0.03 : 0; }, seed));
-    EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << Reported(diagnosis);
+    // A drift may look like it, and never for sure.
+    EXPECT_TRUE(diagnosis.verdict == Verdict::kUnknown || diagnosis.verdict == Verdict::kAmbiguous)
+        << Reported(diagnosis);
+    for (const CauseFound& cause : diagnosis.causes)
+      EXPECT_TRUE(cause.cause == "zero_offset" || cause.candidates.size() > 1)
+          << Reported(diagnosis);
   }
 }
 
