@@ -126,7 +126,7 @@ Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
   Fit by_others = StartFit(truth->facts, corrected.model, fit->aside, options.parallel);
   Selection again = FindTermsOrWalk(templates, options, rule, &by_others, &corrected);
   if (!ReadsTemperature(by_others.model)) return cannot("but nothing goes with the temperature");
-  const double better = NegativeBic(by_others) - NegativeBic(*fit);
+  const double better = BetterBy(by_others, *fit);
   if (better < -kUndecided) return selection;
   const bool is_better = better > kUndecided;
   if (!is_better && truth->owner == Owner::kUnit) return cannot("and these moves do not decide");

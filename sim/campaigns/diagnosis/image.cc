@@ -93,7 +93,7 @@ double NeighboursAgree(const Fit& fit, double* size_um) {
     }
   if (count < 100 || !(variance > 0)) return 0;
   const double share = std::clamp(sum / count, 0.0, 1.0);
-  *size_um = fit.noise.place_um * std::sqrt(2 * share);
+  *size_um = std::hypot(fit.noise.place_um, fit.noise.rest_um) * std::sqrt(2 * share);
   return sum / std::sqrt(variance);
 }
 
