@@ -38,6 +38,31 @@ class StepRows {
     geometry_.Remove(&column);
     return column;
   }
+  /// A jump of the axis before a row, by the rows on either side: b and g of a step of one degree
+  /// there, with the level before it free. Rows near by tell it, whatever other jumps there are.
+  struct Jump {
+    double b = 0, g = 0;
+  };
+  [[nodiscard]] Jump JumpAt(std::size_t axis, std::size_t row) const {
+    constexpr std::size_t kEitherSide = 8;
+    double all_g = 0, all_b = 0, behind_g = 0, behind_b = 0;
+    const std::size_t begin = row - std::min(row, kEitherSide);
+    for (std::size_t k = begin; k < std::min(rows(), row + kEitherSide); ++k) {
+      // Rows of other histories tell nothing of this one.
+      const std::size_t first = std::min(k, row - 1), last = std::max(k, row);
+      if (EndOfStep(white_.track, move(first)) <= move(last)) continue;
+      const double* t = &white_.turn_um[4 * k + 2 * axis];
+      const double* w = white_.filter[k].w;
+      const double x = w[0] * t[0] + w[1] * t[1], y = w[1] * t[0] + w[2] * t[1];
+      const auto at = static_cast<Eigen::Index>(2 * k);
+      const double g = x * x + y * y, b = x * y_[at] + y * y_[at + 1];
+      all_g += g, all_b += b;
+      if (k >= row) behind_g += g, behind_b += b;
+    }
+    if (!(all_g > 0)) return {};
+    const double share = behind_g / all_g;
+    return {behind_b - share * all_b, behind_g - share * behind_g};
+  }
   /// Whether the axis moves after one move and up to another.
   [[nodiscard]] bool Moves(std::size_t axis, std::size_t after, std::size_t to) const {
     for (std::size_t move = after + 1; move <= to; ++move)
@@ -68,7 +93,6 @@ std::size_t MoveAgainst(const UnitTrack& track, std::size_t axis, std::size_t af
 struct Slip {
   std::size_t axis = kTheta, move = 0;
   double step_deg = 0, log_ratio = 0;
-  Eigen::VectorXd column;
 };
 
 Slip BestSlip(const StepRows& rows) {
@@ -78,16 +102,15 @@ Slip BestSlip(const StepRows& rows) {
     for (std::size_t k = 1; k < rows.rows(); ++k) {
       const std::size_t from = rows.move(k - 1), to = rows.move(k);
       if (EndOfHistory(rows.track(), from) <= to || !rows.Moves(axis, from, to)) continue;
-      const Eigen::VectorXd column = rows.Column(axis, to, true);
-      const double g = column.squaredNorm(), b = column.dot(rows.left());
-      const double turns =
-          std::clamp(std::round(b / std::max(g, 1e-300) / turn), -kTurnsMax, kTurnsMax);
+      const auto [b, g] = rows.JumpAt(axis, k);
+      if (!(g > 0)) continue;
+      const double turns = std::clamp(std::round(b / g / turn), -kTurnsMax, kTurnsMax);
       const double step_deg = turns * turn, log_ratio = step_deg * b - step_deg * step_deg * g / 2;
       // A step that lies between two numbers of turns is none of a rotor.
-      const bool is_whole = std::abs(b / std::max(g, 1e-300) - step_deg) <= kBeside * turn;
+      const bool is_whole = std::abs(b / g - step_deg) <= kBeside * turn;
       if (turns == 0 || !is_whole || log_ratio <= best.log_ratio) continue;
       if (const std::size_t move = MoveAgainst(rows.track(), axis, from, to, turns); move != 0)
-        best = {axis, move, step_deg, log_ratio, column};
+        best = {axis, move, step_deg, log_ratio};
     }
   }
   return best;
@@ -109,7 +132,7 @@ std::vector<EventTerm> FindSlips(const Fit& fit, std::size_t unit, double family
     const Slip slip = BestSlip(rows);
     if (slip.log_ratio * factor * factor <= least) break;
     slips.push_back({unit, rows.track().first_row + slip.move, slip.axis, true, slip.step_deg});
-    rows.Take(slip.column, slip.step_deg);
+    rows.Take(rows.Column(slip.axis, slip.move, true), slip.step_deg);
   }
   return slips;
 }
