@@ -22,7 +22,6 @@ constexpr std::array<ModeWord, 3> kModeWords = {{{WaveMode::kAsymmetric, "asymme
                                                  {WaveMode::kSevenSegment, "seven-segment"}}};
 
 constexpr double kLoadMax_uNm = 1000;  // a hundred times the motor's torque at 9 V
-constexpr int kSubdivisionMax = 6144;
 
 std::optional<double> NumberOfText(const std::string& text) {
   double value = 0;

@@ -14,6 +14,9 @@
 
 namespace focalfleet::cli {
 
+/// The finest subdivision of a rotor turn that a command takes.
+inline constexpr int kSubdivisionMax = 6144;
+
 /// The highest voltage that the bridge's switches tolerate.
 inline constexpr double kBridgeMax_V = 12;
 
