@@ -47,6 +47,15 @@ void Refit(Fit* fit) {
   SettleFit(fit, 2);
 }
 
+// What all units do alike moves the image, too, until it has a term.
+void FindImageAnew(const PatchRule& rule, Fit* fit) {
+  if (fit->model.exposures.empty()) return;
+  fit->model.exposures.clear();
+  UpdateResiduals(fit);
+  Refit(fit);
+  AddImageTerms(fit, rule.family_wise);
+}
+
 // Adds the image's shifts as curves over the column that they follow. Other motion stays in the
 // image's own terms.
 bool PatchImage(const PatchRule& rule, UnknownFound* reported, Fit* fit) {
@@ -99,6 +108,7 @@ std::vector<UnknownFound> PatchStructures(const PatchRule& rule,
     }
     seen.back().patched = {std::string(structure->term.form.effect->cause), size_um};
     ++added;
+    FindImageAnew(rule, fit);
   }
   return seen;
 }

@@ -1,7 +1,9 @@
 #include "sim/campaigns/diagnosis/slips.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 
 #include "sim/campaigns/diagnosis/unit_scorer.h"
 
@@ -12,6 +14,10 @@ constexpr std::size_t kSlipsOfUnitMax = 40;
 constexpr double kTurnsMax = 20;
 constexpr double kBeside = 0.25;  // of a turn, either way: half of all steps by chance
 
+// Columns of a row, side by side: the geometry's, and the residual.
+constexpr Eigen::Index kGeometryColumns = 6, kStepColumns = kGeometryColumns + 1;
+using StepProducts = Eigen::Matrix<double, kStepColumns, kStepColumns>;
+
 // A unit's whitened residuals beside its geometry, and what steps make of them.
 class StepRows {
  public:
@@ -19,6 +25,7 @@ class StepRows {
       : white_(Whiten(fit, unit)), geometry_(white_.y.size()), y_(white_.y) {
     for (Eigen::Index c = 0; c < white_.geometry.cols(); ++c) geometry_.Add(white_.geometry.col(c));
     geometry_.Remove(&y_);
+    AddUp();
   }
 
   [[nodiscard]] const UnitTrack& track() const { return white_.track; }
@@ -38,44 +45,80 @@ class StepRows {
     geometry_.Remove(&column);
     return column;
   }
-  /// A jump of the axis before a row, by the rows on either side: b and g of a step of one degree
-  /// there, with the level before it free. Rows near by tell it, whatever other jumps there are.
   struct Jump {
     double b = 0, g = 0;
   };
-  [[nodiscard]] Jump JumpAt(std::size_t axis, std::size_t row) const {
-    constexpr std::size_t kEitherSide = 8;
-    double all_g = 0, all_b = 0, behind_g = 0, behind_b = 0;
-    const std::size_t begin = row - std::min(row, kEitherSide);
-    for (std::size_t k = begin; k < std::min(rows(), row + kEitherSide); ++k) {
-      // Rows of other histories tell nothing of this one.
-      const std::size_t first = std::min(k, row - 1), last = std::max(k, row);
-      if (EndOfStep(white_.track, move(first)) <= move(last)) continue;
-      const double* t = &white_.turn_um[4 * k + 2 * axis];
-      const double* w = white_.filter[k].w;
-      const double x = w[0] * t[0] + w[1] * t[1], y = w[1] * t[0] + w[2] * t[1];
-      const auto at = static_cast<Eigen::Index>(2 * k);
-      const double g = x * x + y * y, b = x * y_[at] + y * y_[at + 1];
-      all_g += g, all_b += b;
-      if (k >= row) behind_g += g, behind_b += b;
+  /// A step of one degree of each axis before a row, by at most `either_side` rows on each side: b
+  /// and g with the geometry free in these rows alone. A unit's geometry is bent by the steps that
+  /// are not found yet; free here, it takes nothing from a jump.
+  [[nodiscard]] std::array<Jump, 2> JumpsAt(std::size_t row, std::size_t either_side,
+                                            double least) const {
+    std::size_t begin = row - std::min(row, either_side);
+    std::size_t end = std::min(rows(), row + either_side);
+    // Rows of other histories tell nothing of this one.
+    while (EndOfStep(white_.track, move(begin)) <= move(row - 1)) ++begin;
+    while (EndOfStep(white_.track, move(row)) <= move(end - 1)) --end;
+    const StepProducts all = sums_[end] - sums_[begin];
+    Eigen::Matrix<double, kGeometryColumns, kGeometryColumns> gram =
+        all.topLeftCorner<kGeometryColumns, kGeometryColumns>();
+    constexpr double kDependent = 1e-9;  // of each column's square: the rest is rounding
+    gram.diagonal() += kDependent * gram.diagonal();
+    gram.diagonal().array() += 1e-300;  // a column of zeros
+    const auto solver = gram.ldlt();
+    const Eigen::Matrix<double, kGeometryColumns, 1> level =
+        solver.solve(all.block<kGeometryColumns, 1>(0, kGeometryColumns));
+    const double square = all(kGeometryColumns, kGeometryColumns) -
+                          level.dot(all.block<kGeometryColumns, 1>(0, kGeometryColumns));
+    if (square / 2 <= least) return {};
+    const auto at = static_cast<Eigen::Index>(2 * row);
+    const auto size = static_cast<Eigen::Index>(2 * (end - row));
+    const auto geometry = white_.geometry.middleRows(at, size);
+    std::array<Jump, 2> jumps;
+    for (const std::size_t axis : {kTheta, kPhi}) {
+      const Eigen::VectorXd column = Behind(axis, row, end);
+      Eigen::Matrix<double, kGeometryColumns, 1> with =
+          Eigen::Matrix<double, kGeometryColumns, 1>::Zero();
+      with.head(geometry.cols()) = geometry.transpose() * column;
+      jumps[axis] = {column.dot(y_.segment(at, size)) - with.dot(level),
+                     column.squaredNorm() - with.dot(solver.solve(with))};
     }
-    if (!(all_g > 0)) return {};
-    const double share = behind_g / all_g;
-    return {behind_b - share * all_b, behind_g - share * behind_g};
-  }
-  /// Whether the axis moves after one move and up to another.
-  [[nodiscard]] bool Moves(std::size_t axis, std::size_t after, std::size_t to) const {
-    for (std::size_t move = after + 1; move <= to; ++move)
-      if (white_.track.step_deg[axis][move] != 0) return true;
-    return false;
+    return jumps;
   }
   [[nodiscard]] const Eigen::VectorXd& left() const { return y_; }
-  void Take(const Eigen::VectorXd& column, double step_deg) { y_ -= step_deg * column; }
+  void Take(const Eigen::VectorXd& column, double step_deg) {
+    y_ -= step_deg * column;
+    AddUp();
+  }
 
  private:
+  // A step of one degree as the rows from `row` to `end` show it, whitened.
+  [[nodiscard]] Eigen::VectorXd Behind(std::size_t axis, std::size_t row, std::size_t end) const {
+    Eigen::VectorXd column(static_cast<Eigen::Index>(2 * (end - row)));
+    for (std::size_t k = row; k < end; ++k)
+      for (std::size_t xy = 0; xy < 2; ++xy)
+        column[static_cast<Eigen::Index>(2 * (k - row) + xy)] =
+            white_.turn_um[4 * k + 2 * axis + xy];
+    ApplyFilter(std::span(white_.filter).subspan(row, end - row),
+                std::span(white_.turn_um).subspan(4 * row, 4 * (end - row)), column.data());
+    return column;
+  }
+  // Sums of the columns' products over all rows before each.
+  void AddUp() {
+    sums_.assign(1, StepProducts::Zero());
+    for (std::size_t k = 0; k < rows(); ++k) {
+      Eigen::Matrix<double, 2, kStepColumns> columns =
+          Eigen::Matrix<double, 2, kStepColumns>::Zero();
+      const auto at = static_cast<Eigen::Index>(2 * k);
+      columns.leftCols(white_.geometry.cols()) = white_.geometry.middleRows<2>(at);
+      columns.col(kGeometryColumns) = y_.segment<2>(at);
+      sums_.push_back(sums_.back() + columns.transpose() * columns);
+    }
+  }
+
   WhiteUnit white_;
   Basis geometry_;
   Eigen::VectorXd y_;
+  std::vector<StepProducts> sums_;  // Shape: (rows + 1)
 };
 
 // The longest move after one seen row and up to the next that went the other way; 0: none.
@@ -95,23 +138,33 @@ struct Slip {
   double step_deg = 0, log_ratio = 0;
 };
 
-Slip BestSlip(const StepRows& rows) {
-  Slip best;
-  for (const std::size_t axis : {kTheta, kPhi}) {
-    const double turn = 360 / rows.track().unit->gear[axis];
+// Rows on either side that a jump is looked for by. The narrowest that shows a slip has the fewest
+// other slips within it: narrowest over threshold, Baranowski et al., J. R. Stat. Soc. B 81, 649.
+constexpr std::array<std::size_t, 3> kEitherSide = {4, 8, 16};
+
+// The likeliest slip with a likelihood ratio above e^least, by as few rows as show one.
+Slip BestSlip(const StepRows& rows, double least) {
+  Slip best{.log_ratio = least};
+  for (const std::size_t either_side : kEitherSide) {
     for (std::size_t k = 1; k < rows.rows(); ++k) {
       const std::size_t from = rows.move(k - 1), to = rows.move(k);
-      if (EndOfHistory(rows.track(), from) <= to || !rows.Moves(axis, from, to)) continue;
-      const auto [b, g] = rows.JumpAt(axis, k);
-      if (!(g > 0)) continue;
-      const double turns = std::clamp(std::round(b / g / turn), -kTurnsMax, kTurnsMax);
-      const double step_deg = turns * turn, log_ratio = step_deg * b - step_deg * step_deg * g / 2;
-      // A step that lies between two numbers of turns is none of a rotor.
-      const bool is_whole = std::abs(b / g - step_deg) <= kBeside * turn;
-      if (turns == 0 || !is_whole || log_ratio <= best.log_ratio) continue;
-      if (const std::size_t move = MoveAgainst(rows.track(), axis, from, to, turns); move != 0)
-        best = {axis, move, step_deg, log_ratio};
+      if (EndOfHistory(rows.track(), from) <= to) continue;
+      const std::array<StepRows::Jump, 2> jumps = rows.JumpsAt(k, either_side, best.log_ratio);
+      for (const std::size_t axis : {kTheta, kPhi}) {
+        const auto [b, g] = jumps[axis];
+        if (!(g > 0)) continue;
+        const double turn = 360 / rows.track().unit->gear[axis];
+        const double turns = std::clamp(std::round(b / g / turn), -kTurnsMax, kTurnsMax);
+        const double step_deg = turns * turn;
+        const double log_ratio = step_deg * b - step_deg * step_deg * g / 2;
+        // A step that lies between two numbers of turns is none of a rotor.
+        const bool is_whole = std::abs(b / g - step_deg) <= kBeside * turn;
+        if (turns == 0 || !is_whole || log_ratio <= best.log_ratio) continue;
+        if (const std::size_t move = MoveAgainst(rows.track(), axis, from, to, turns); move != 0)
+          best = {axis, move, step_deg, log_ratio};
+      }
     }
+    if (best.move != 0) break;
   }
   return best;
 }
@@ -122,15 +175,16 @@ std::vector<EventTerm> FindSlips(const Fit& fit, std::size_t unit, double family
   std::vector<EventTerm> slips;
   if (!fit.UsesUnit(unit)) return slips;
   StepRows rows(fit, unit);
-  // Each axis may slip in each move by any number of turns.
-  const double could_be = 2 * static_cast<double>(fit.facts->campaign->rows()) * 2 * kTurnsMax;
-  const double least = std::log(could_be / family_wise);
+  // Each axis may slip in each move by any number of turns, and is looked at by several rows.
+  const double could_be = 2 * static_cast<double>(fit.facts->campaign->rows()) * 2 * kTurnsMax *
+                          static_cast<double>(kEitherSide.size());
   // A unit that slips again and again looks like a noisy one until its slips are known. Its noise
   // is that of the others here.
   const double factor = std::max(fit.noise.unit_factor[unit], 1.0);
+  const double least = std::log(could_be / family_wise) / (factor * factor);
   while (slips.size() < kSlipsOfUnitMax) {
-    const Slip slip = BestSlip(rows);
-    if (slip.log_ratio * factor * factor <= least) break;
+    const Slip slip = BestSlip(rows, least);
+    if (slip.move == 0) break;
     slips.push_back({unit, rows.track().first_row + slip.move, slip.axis, true, slip.step_deg});
     rows.Take(rows.Column(slip.axis, slip.move, true), slip.step_deg);
   }

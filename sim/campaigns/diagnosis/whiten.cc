@@ -72,7 +72,7 @@ void RunFilter(const Fit& fit, std::size_t unit, std::vector<double>* made, Whit
 
 }  // namespace
 
-void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>& turn_um,
+void ApplyFilter(std::span<const RowFilter> filter, std::span<const double> turn_um,
                  double* xy_um) {
   double theta = 0, phi = 0, x = 0, y = 0;  // rest errors, estimated from the rows so far
   for (std::size_t k = 0; k < filter.size(); ++k) {

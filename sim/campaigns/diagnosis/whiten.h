@@ -18,6 +18,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "sim/campaigns/campaign/place_steps.h"
@@ -64,7 +65,7 @@ struct WhiteUnit {
 };
 
 /// The same for the rows of a filter. Shapes: filter (n), turn_um (n, 4), xy_um (2 n).
-void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>& turn_um,
+void ApplyFilter(std::span<const RowFilter> filter, std::span<const double> turn_um,
                  double* xy_um);
 
 /// Degrees of freedom of Student's t in two dimensions, by which a likelihood judges a whitened

@@ -277,13 +277,13 @@ TEST(SimulateCampaign, EffectsAreCauseAxisShapeAndAmplitude) {
     return Focalfleet({"simulate", "campaign", "--units", "3", "--moves", "8", "--effect", effect,
                        "--out", scratch / "made"});
   };
-  for (const char* effect : {"backlash=0.1", "backlash:phi=-1e-1", "stiction:theta#24=1",
+  for (const char* effect : {"backlash=0.1", "backlash:phi=-1e-1", "stiction:theta#45=1",
                              "lost_command=2", "centroid_bias=8"})
     EXPECT_EQ(made(effect).exit, 0) << effect << made(effect).err;
   EXPECT_THAT(Slurp(scratch / "made/moves.csv"), HasSubstr("pixel_x"));
   const auto listed = made("stiction:theta#999=1");
   EXPECT_EQ(listed.exit, 2);
-  EXPECT_THAT(listed.err, HasSubstr("24  theta: until the next move; jumps from, deg, 0.4"));
+  EXPECT_THAT(listed.err, HasSubstr("45  theta: until the next move; jumps from, deg, 0.4"));
   for (const char* effect :
        {"backlash", "backlash=", "backlash=x", "backlash:=1", "backlash#=1", "backlash#-1=1",
         "backlash=1=2", "Backlash=1", "backlash:z=1", "nothing=1", "backlash=1e999"}) {
