@@ -25,6 +25,7 @@
 #include "daemon/store/store.h"
 #include "daemon/store/store_reader.h"
 #include "daemon/systemd/notify_socket.h"
+#include "daemon/usage/build_version.h"
 #include "daemon/verbs/alarm_register.h"
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/model_upkeep.h"
@@ -148,6 +149,8 @@ class Daemon {
   std::unique_ptr<Coordinator> coordinator_;
   std::unique_ptr<BusLines> lines_;
   std::unique_ptr<StoreThread> store_thread_;
+  std::unique_ptr<StoreQuestions> questions_;
+  std::unique_ptr<ReaderThread> reader_;  // uses questions_
   std::unique_ptr<PlannerThread> planner_;
   std::unique_ptr<ModelRegistry> models_;
   AlarmRegister alarms_;
@@ -320,6 +323,14 @@ Status Daemon::StartThreads() {
                       return Plan(work, ending, alive);
                     },
                     signal_.get(), {.name = "planner", .alive = Answering(&service_.planner)}));
+  // The watchdog does not wait for the reader: a long question must not restart the daemon.
+  questions_ = std::make_unique<StoreQuestions>(config_.store.path);
+  FOCALFLEET_TRY_ASSIGN(reader_,
+                        ReaderThread::Create(
+                            [this](const StoreQuestion& question, const std::atomic<bool>& ending) {
+                              return questions_->Answer(question, &ending);
+                            },
+                            signal_.get(), {.name = "reader"}));
   if (measuring_.camera != nullptr || measuring_.carriers != nullptr) {
     FOCALFLEET_TRY_ASSIGN(
         measuring_.thread,
@@ -342,6 +353,7 @@ Status Daemon::StartThreads() {
                                                   .planner = planner_.get(),
                                                   .camera = measuring_.thread.get(),
                                                   .store = store_thread_.get(),
+                                                  .reader = reader_.get(),
                                                   .scheduler = status_.scheduler.get(),
                                                   .metrics = metrics_.sampler.get(),
                                                   .sync = sync_.get(),
@@ -418,6 +430,8 @@ Status Daemon::End() {
                                     {"the camera", [this] { measuring_.thread.reset(); }},
                                     {"the metrics", [this] { metrics_.endpoint.reset(); }}});
   const Status stored = store_thread_->Finish();
+  reader_.reset();  // soon: a question that runs is cut short
+  questions_.reset();
   handler_->Close();
   status_.publisher.reset();
   store_.reset();
@@ -460,7 +474,7 @@ ShellFacts Daemon::Facts() const {
 
 }  // namespace
 
-const char* Version() { return FOCALFLEET_VERSION; }
+const char* Version() { return BuildVersion(); }
 
 DaemonEnd RunDaemon(const DaemonConfig& config) {
   EventLoop::BlockSignals();

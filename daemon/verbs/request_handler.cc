@@ -102,6 +102,7 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
     return Send(line.client, answer);
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
+  if (auto reading = AskStore(view, *request)) return Queue(pending, std::move(*reading));
   if (request->verb == "wait") return Wait(view, *request, pending);
   if (request->verb == "preview") {
     const Status planned = Plan(view, *request, pending);
@@ -130,7 +131,7 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
   pending.note = NoteOn(view, *command);
   command->request = next_request_++;
   pending_.emplace(command->request, pending);
-  waiting_ += pending.wait ? 1u : 0u;
+  waiting_ += pending.gets_progress() ? 1u : 0u;
   commands->push_back(std::move(*command));
 }
 
@@ -138,15 +139,8 @@ std::optional<Result<Json>> RequestHandler::Ask(const FleetView& view,
                                                 const ControlRequest& request) {
   if (request.verb == "status") return Result<Json>(StatusJson(view, options_.facts()));
   if (request.verb == "unit") return AskUnit(view, request);
-  if (request.verb == "params") return AskParameters(view, request);
-  const OpenReader reader = [this] { return Reader(); };
-  if (request.verb == "history") return AskHistory(request, view, reader);
-  if (request.verb == "events") return AskEvents(request, view, reader);
+  if (request.verb == "alarms") return AskOpenAlarms(request);
   if (request.verb == "select") return AskSelection(request, view);
-  if (request.verb == "alarms")
-    return AskAlarms(
-        request, *options_.alarms, [this] { return Reader(); }, WallTime::Now());
-  if (request.verb == "measurements") return AskMeasurements(view, request);
   if (request.verb == "model")
     return Result<Json>(options_.models->Show(ModelRegistry::kChangesMax));
   return std::nullopt;
@@ -157,41 +151,89 @@ Result<Json> RequestHandler::AskUnit(const FleetView& view, const ControlRequest
   return UnitJson(view, i);
 }
 
-Result<Json> RequestHandler::AskParameters(const FleetView& view, const ControlRequest& request) {
+/// Open alarms are known here, also where the store cannot be read.
+std::optional<Result<Json>> RequestHandler::AskOpenAlarms(const ControlRequest& request) {
+  const auto all = FlagArgumentOr(request.args, "all", false);
+  if (all && *all) return std::nullopt;  // AskStore
+  const auto reading = AskAlarms(request, *options_.alarms, WallTime::Now());
+  if (!reading) return Result<Json>(tl::unexpected<Error>(reading.error()));
+  return (*reading)(nullptr);
+}
+
+std::optional<Result<StoreReading>> RequestHandler::AskStore(const FleetView& view,
+                                                             const ControlRequest& request) {
+  if (request.verb == "params") return AskParameters(view, request);
+  if (request.verb == "history") return AskHistory(request, view);
+  if (request.verb == "events") return AskEvents(request, view);
+  if (request.verb == "alarms") return AskAlarms(request, *options_.alarms, WallTime::Now());
+  if (request.verb == "measurements") return AskMeasurements(view, request);
+  return std::nullopt;
+}
+
+Result<StoreReading> RequestHandler::AskParameters(const FleetView& view,
+                                                   const ControlRequest& request) {
   FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
   const UnitView& unit = view.coordinator->unit(i);
   const SerialNumber serial = unit.bound_serial.value != 0 ? unit.bound_serial : unit.serial;
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(const auto history, reader->Parameters(serial, kParameterRowsMax));
-  FOCALFLEET_TRY_ASSIGN(const auto tunings, reader->Tunings(serial, kParameterRowsMax));
   const Json known = UnitJson(view, i);
   Json drive = {{"mode", known["mode"]}, {"v_bus_V", known["v_bus_V"]}};
   for (const char* axis : {"theta", "phi"})
     for (const char* name : {"counter1", "repeat", "subdivision"})
       drive[std::string(axis) + "_" + name] = known[axis][name];
-  return Json{{"unit_id", view.layout->unit(i).id.value},
-              {"serial", serial.value},
-              {"drive", std::move(drive)},  // effective values, stored or by default
-              {"parameters", NewestOf(history)},
-              {"tuning", NewestOf(tunings)},
-              {"tuning_history", HistoryJson(tunings)},
-              {"history", HistoryJson(history)}};
+  const std::uint32_t id = view.layout->unit(i).id.value;
+  return StoreReading([id, serial, drive](StoreReader* store) -> Result<Json> {
+    FOCALFLEET_TRY_ASSIGN(const auto history, store->Parameters(serial, kParameterRowsMax));
+    FOCALFLEET_TRY_ASSIGN(const auto tunings, store->Tunings(serial, kParameterRowsMax));
+    return Json{{"unit_id", id},
+                {"serial", serial.value},
+                {"drive", drive},  // effective values, stored or by default
+                {"parameters", NewestOf(history)},
+                {"tuning", NewestOf(tunings)},
+                {"tuning_history", HistoryJson(tunings)},
+                {"history", HistoryJson(history)}};
+  });
 }
 
 /// {exposure?}: without it, the newest exposure of the last configuration.
-Result<Json> RequestHandler::AskMeasurements(const FleetView& view, const ControlRequest& request) {
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(std::uint64_t exposure, UnsignedArgumentOr(request.args, "exposure", 0));
-  if (exposure == 0) {
-    FOCALFLEET_TRY_ASSIGN(const auto last,
-                          reader->LastExposure(view.coordinator->configuration().id));
-    if (!last) return Fail(ErrorCode::kRefused, "the last configuration was not measured");
-    exposure = *last;
-  }
-  FOCALFLEET_TRY_ASSIGN(const auto rows, reader->Measurements(exposure));
-  if (rows.empty())
-    return Fail(ErrorCode::kRefused, "there is no exposure " + std::to_string(exposure));
-  return Json{{"exposure", exposure}, {"measurements", HistoryJson(rows)}};
+Result<StoreReading> RequestHandler::AskMeasurements(const FleetView& view,
+                                                     const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(const std::uint64_t asked, UnsignedArgumentOr(request.args, "exposure", 0));
+  const std::uint64_t configuration = view.coordinator->configuration().id;
+  return StoreReading([asked, configuration](StoreReader* store) -> Result<Json> {
+    std::uint64_t exposure = asked;
+    if (exposure == 0) {
+      FOCALFLEET_TRY_ASSIGN(const auto last, store->LastExposure(configuration));
+      if (!last) return Fail(ErrorCode::kRefused, "the last configuration was not measured");
+      exposure = *last;
+    }
+    FOCALFLEET_TRY_ASSIGN(const auto rows, store->Measurements(exposure));
+    if (rows.empty())
+      return Fail(ErrorCode::kRefused, "there is no exposure " + std::to_string(exposure));
+    return Json{{"exposure", exposure}, {"measurements", HistoryJson(rows)}};
+  });
+}
+
+/// The question waits for the reader's thread.
+void RequestHandler::Queue(const Pending& pending, Result<StoreReading> reading) {
+  if (!reading) return Answer(pending, tl::unexpected<Error>(std::move(reading).error()));
+  if (asked_.size() >= limits::kControlClients)  // each client has one, and most wait for it
+    return Answer(pending, Fail(ErrorCode::kFull, std::to_string(asked_.size()) +
+                                                      " questions wait for the store; ask again "
+                                                      "when they are answered"));
+  const std::uint64_t number = next_request_++;
+  asked_.emplace(number, pending);
+  questions_.push_back({number, pending.id, std::move(*reading)});
+}
+
+void RequestHandler::SubmitQuestions(const std::function<bool(StoreQuestion*)>& submit) {
+  while (!questions_.empty() && submit(&questions_.front())) questions_.pop_front();
+}
+
+void RequestHandler::Answered(const StoreAnswer& answer) {
+  const auto it = asked_.find(answer.number);
+  if (it == asked_.end()) return;
+  Send(it->second.client, answer.line);
+  asked_.erase(it);
 }
 
 std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view,
@@ -269,7 +311,7 @@ void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
   it->second.began = true;
   if (!reply.last && (pending.wait || pending.is_retarget)) return;
   pending_.erase(it);
-  waiting_ -= pending.wait ? 1u : 0u;
+  waiting_ -= pending.gets_progress() ? 1u : 0u;
   if (reply.error) {
     options_.log("refused or failed: " + reply.error->text);
     if (pending.is_retarget && pending.began)
@@ -333,8 +375,10 @@ Status RequestHandler::Plan(const FleetView& view, const ControlRequest& request
                         CommandOf({.id = request.id, .verb = "apply", .args = request.args}, view));
   FOCALFLEET_TRY_ASSIGN(Preview preview,
                         view.coordinator->PreviewOf(std::get<ApplyCommand>(command.what)));
-  dry_run_ = {
-      .pending = pending, .targeted = preview.targeted, .refused = std::move(preview.refused)};
+  dry_run_ = {.pending = pending,
+              .targeted = preview.targeted,
+              .refused = std::move(preview.refused),
+              .since = view.now};
   preview_job_ = std::move(preview.job);
   return {};
 }
@@ -356,17 +400,30 @@ void RequestHandler::RefusePreview() {
 }
 
 void RequestHandler::ShowProgress(const FleetView& view) {
-  if (waiting_ == 0) return;
-  AnswerWaiters(view);
-  if (view.now < progress_at_) return;
+  if (waiting_ > 0) AnswerWaiters(view);
+  if ((waiting_ == 0 && !dry_run_) || view.now < progress_at_) return;
   progress_at_ = view.now + options_.progress_period;
+  if (dry_run_) {
+    const double second = static_cast<double>(options_.second.ns);
+    const Json planning{
+        {"state", Name(ConfigurationState::kPlanning)},
+        {"dry_run", true},
+        {"targeted", dry_run_->targeted},
+        {"elapsed_s", static_cast<double>((view.now - dry_run_->since).ns) / second}};
+    server_.Progress(dry_run_->pending.client, EncodeProgress(dry_run_->pending.id, planning));
+  }
+  if (waiting_ == 0) return;
   const Json progress = ProgressJson(view);
   for (const auto& [request, pending] : pending_)
-    if (pending.wait) server_.Progress(pending.client, EncodeProgress(pending.id, progress));
+    if (pending.gets_progress())
+      server_.Progress(pending.client, EncodeProgress(pending.id, progress));
 }
 
 void RequestHandler::Close() {
   if (dry_run_) pending_.emplace(next_request_++, std::exchange(dry_run_, std::nullopt)->pending);
+  pending_.merge(asked_);  // their numbers are from one series
+  questions_.clear();
+  asked_.clear();
   for (const auto& [request, pending] : pending_)
     Answer(pending,
            Fail(ErrorCode::kUnavailable,
