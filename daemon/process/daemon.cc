@@ -76,6 +76,11 @@ struct Measuring {
   std::unique_ptr<CameraThread> thread;          // none: neither camera nor sensors
 };
 
+struct StoreThreads {
+  std::unique_ptr<StoreThread> writer;
+  std::unique_ptr<ReaderThread> reader;
+};
+
 /// Numbers for /metrics. The counters are kept also where there is no endpoint.
 struct Metrics {
   WorkCounters work;
@@ -148,9 +153,7 @@ class Daemon {
   Metrics metrics_;
   std::unique_ptr<Coordinator> coordinator_;
   std::unique_ptr<BusLines> lines_;
-  std::unique_ptr<StoreThread> store_thread_;
-  std::unique_ptr<StoreQuestions> questions_;
-  std::unique_ptr<ReaderThread> reader_;  // uses questions_
+  StoreThreads stored_;
   std::unique_ptr<PlannerThread> planner_;
   std::unique_ptr<ModelRegistry> models_;
   AlarmRegister alarms_;
@@ -315,7 +318,7 @@ std::function<void()> Daemon::Answering(Heartbeat* heartbeat) {
 }
 
 Status Daemon::StartThreads() {
-  FOCALFLEET_TRY_ASSIGN(store_thread_, StoreThread::Create(StoreSinks(), signal_.get()));
+  FOCALFLEET_TRY_ASSIGN(stored_.writer, StoreThread::Create(StoreSinks(), signal_.get()));
   FOCALFLEET_TRY_ASSIGN(
       planner_, PlannerThread::Create(
                     [this, alive = Answering(&service_.planner)](const PlannerWork& work,
@@ -324,13 +327,8 @@ Status Daemon::StartThreads() {
                     },
                     signal_.get(), {.name = "planner", .alive = Answering(&service_.planner)}));
   // The watchdog does not wait for the reader: a long question must not restart the daemon.
-  questions_ = std::make_unique<StoreQuestions>(config_.store.path);
-  FOCALFLEET_TRY_ASSIGN(reader_,
-                        ReaderThread::Create(
-                            [this](const StoreQuestion& question, const std::atomic<bool>& ending) {
-                              return questions_->Answer(question, &ending);
-                            },
-                            signal_.get(), {.name = "reader"}));
+  FOCALFLEET_TRY_ASSIGN(stored_.reader, ReaderThread::Create(StoreQuestions(config_.store.path),
+                                                             signal_.get(), {.name = "reader"}));
   if (measuring_.camera != nullptr || measuring_.carriers != nullptr) {
     FOCALFLEET_TRY_ASSIGN(
         measuring_.thread,
@@ -352,8 +350,8 @@ Status Daemon::StartThreads() {
                                                   .alarms = &alarms_,
                                                   .planner = planner_.get(),
                                                   .camera = measuring_.thread.get(),
-                                                  .store = store_thread_.get(),
-                                                  .reader = reader_.get(),
+                                                  .store = stored_.writer.get(),
+                                                  .reader = stored_.reader.get(),
                                                   .scheduler = status_.scheduler.get(),
                                                   .metrics = metrics_.sampler.get(),
                                                   .sync = sync_.get(),
@@ -386,7 +384,7 @@ void Daemon::OpenService() {
   const auto interval = WatchdogInterval(environment);
   if (interval && service_.socket.present()) {
     std::vector<Watchdog::Thread> threads = {
-        {"store", &service_.store, [this] { store_thread_->Wake(); }},
+        {"store", &service_.store, [this] { stored_.writer->Wake(); }},
         {"planner", &service_.planner, [this] { planner_->Wake(); }}};
     if (measuring_.thread != nullptr)
       threads.push_back({"camera", &service_.camera, [this] { measuring_.thread->Wake(); }});
@@ -423,15 +421,14 @@ Status Daemon::Run() {
 /// daemon, and the socket is gone. Parts that may hang end meanwhile, or are left behind.
 Status Daemon::End() {
   const SlowEnd slow_end(&service_.socket,
-                         {.progress = [this] { return store_thread_->committed_through(); }});
+                         {.progress = [this] { return stored_.writer->committed_through(); }});
   ending_ = std::make_unique<BoundedEnd>(
       std::vector<BoundedEnd::Part>{{"the buses", [this] { lines_.reset(); }},
                                     {"the planner", [this] { planner_.reset(); }},
                                     {"the camera", [this] { measuring_.thread.reset(); }},
                                     {"the metrics", [this] { metrics_.endpoint.reset(); }}});
-  const Status stored = store_thread_->Finish();
-  reader_.reset();  // soon: a question that runs is cut short
-  questions_.reset();
+  const Status stored = stored_.writer->Finish();
+  stored_.reader.reset();  // soon: a question that runs is cut short
   handler_->Close();
   status_.publisher.reset();
   store_.reset();
@@ -455,8 +452,8 @@ ShellFacts Daemon::Facts() const {
   const AlarmRegister::Counts alarms = alarms_.Count(WallTime::Now());
   facts.alarms = {alarms.open, alarms.muted, alarms.worst ? Name(*alarms.worst) : ""};
   facts.store_path = config_.store.path;
-  facts.store_failing = store_thread_->failing();
-  facts.batches_waiting = store_thread_->waiting();
+  facts.store_failing = stored_.writer->failing();
+  facts.batches_waiting = stored_.writer->waiting();
   facts.store.transactions = metrics_.work.transactions;
   facts.store.rows = metrics_.work.rows;
   facts.dds_enabled = status_.publisher != nullptr;

@@ -64,7 +64,7 @@ class StoreReader {
   Result<EntryNumbers> NewestEntries();
   /// At most `limit` of each kind, the oldest first.
   Result<EntriesAfter> After(const EntryNumbers& numbers, std::uint32_t limit);
-  /// Queries end with kUnavailable once `ending` is true; it outlives the reader.
+  /// Queries end with kUnavailable once `ending` is true. Pre: `ending` outlives them.
   void EndWith(const std::atomic<bool>* ending);
 
  private:

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/status/history_json.h"
+#include "daemon/status/status_json.h"
 #include "daemon/verbs/requested_command.h"
 #include "daemon/verbs/unit_selection.h"
 #include "fleet/row_check.h"
@@ -18,6 +19,7 @@ namespace focalfleet {
 namespace {
 
 constexpr std::uint64_t kHistoryRowsMax = 1000;
+constexpr std::uint64_t kParameterRowsMax = 1000;
 /// Rows of a table that are looked at for events of some units or severities: some 20 ms.
 constexpr std::uint32_t kRowsLookedAt = 10'000;
 /// Entries that one page of a follower goes on by, of all kinds together.
@@ -109,6 +111,28 @@ Json JsonOf(const Event& event) {
           {"unit_id", event.unit ? Json(event.unit->value) : Json()},
           {"bus_id", event.bus ? Json(event.bus->value) : Json()},
           {"text", event.text}};
+}
+
+/// The newest value of each axis and parameter; `history` is newest first.
+Json NewestOf(const std::vector<ParameterHistory>& history) {
+  std::vector<ParameterHistory> newest;
+  for (const ParameterHistory& entry : history) {
+    const bool known = std::ranges::any_of(newest, [&](const ParameterHistory& other) {
+      return other.row.axis == entry.row.axis && other.row.parameter == entry.row.parameter;
+    });
+    if (!known) newest.push_back(entry);
+  }
+  return HistoryJson(newest);
+}
+
+/// The newest of each axis; `history` is newest first.
+Json NewestOf(const std::vector<TuningHistory>& history) {
+  std::vector<TuningHistory> newest;
+  for (const TuningHistory& entry : history)
+    if (std::ranges::none_of(
+            newest, [&](const TuningHistory& other) { return other.row.axis == entry.row.axis; }))
+      newest.push_back(entry);
+  return HistoryJson(newest);
 }
 
 /// All events of the period, as far as they are looked at and not after `newest`, in any order.
@@ -282,6 +306,46 @@ Result<StoreReading> AskEvents(const ControlRequest& request, const FleetView& v
         after ? 0 : events.size() - std::min<std::size_t>(events.size(), limit);
     for (std::size_t k = first; k < events.size(); ++k) list.push_back(JsonOf(events[k]));
     return Json{{"events", std::move(list)}, {"next", JsonOf(page.reached)}, {"more", page.more}};
+  });
+}
+
+Result<StoreReading> AskParameters(const ControlRequest& request, const FleetView& view) {
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
+  const UnitView& unit = view.coordinator->unit(i);
+  const SerialNumber serial = unit.bound_serial.value != 0 ? unit.bound_serial : unit.serial;
+  const Json known = UnitJson(view, i);
+  Json drive = {{"mode", known["mode"]}, {"v_bus_V", known["v_bus_V"]}};
+  for (const char* axis : {"theta", "phi"})
+    for (const char* name : {"counter1", "repeat", "subdivision"})
+      drive[std::string(axis) + "_" + name] = known[axis][name];
+  const std::uint32_t id = view.layout->unit(i).id.value;
+  return StoreReading([id, serial, drive](StoreReader* store) -> Result<Json> {
+    FOCALFLEET_TRY_ASSIGN(const auto history, store->Parameters(serial, kParameterRowsMax));
+    FOCALFLEET_TRY_ASSIGN(const auto tunings, store->Tunings(serial, kParameterRowsMax));
+    return Json{{"unit_id", id},
+                {"serial", serial.value},
+                {"drive", drive},  // effective values, stored or by default
+                {"parameters", NewestOf(history)},
+                {"tuning", NewestOf(tunings)},
+                {"tuning_history", HistoryJson(tunings)},
+                {"history", HistoryJson(history)}};
+  });
+}
+
+Result<StoreReading> AskMeasurements(const ControlRequest& request, const FleetView& view) {
+  FOCALFLEET_TRY_ASSIGN(const std::uint64_t asked, UnsignedArgumentOr(request.args, "exposure", 0));
+  const std::uint64_t configuration = view.coordinator->configuration().id;
+  return StoreReading([asked, configuration](StoreReader* store) -> Result<Json> {
+    std::uint64_t exposure = asked;
+    if (exposure == 0) {
+      FOCALFLEET_TRY_ASSIGN(const auto last, store->LastExposure(configuration));
+      if (!last) return Fail(ErrorCode::kRefused, "the last configuration was not measured");
+      exposure = *last;
+    }
+    FOCALFLEET_TRY_ASSIGN(const auto rows, store->Measurements(exposure));
+    if (rows.empty())
+      return Fail(ErrorCode::kRefused, "there is no exposure " + std::to_string(exposure));
+    return Json{{"exposure", exposure}, {"measurements", HistoryJson(rows)}};
   });
 }
 

@@ -1,5 +1,5 @@
-// The requests about the past: configurations and alarms, the moves of a unit, and the events of
-// all of them in the order of time.
+// The requests about the past: configurations and alarms, the moves, parameters and measurements of
+// units, and the events of all of them in the order of time.
 #pragma once
 
 #include "daemon/control/messages.h"
@@ -23,5 +23,13 @@ Result<StoreReading> AskHistory(const ControlRequest& request, const FleetView& 
 /// after `next`. Nothing is left out from one page to the next: entries are counted by their
 /// numbers in the store, not by the clock. Errors: kInvalid; those of the store.
 Result<StoreReading> AskEvents(const ControlRequest& request, const FleetView& view);
+
+/// The answer to `params` {unit_id}: what the unit's hardware was set to, and how it was tuned.
+/// Errors: kInvalid; those of the store.
+Result<StoreReading> AskParameters(const ControlRequest& request, const FleetView& view);
+
+/// The answer to `measurements` {exposure?}: without it, those of the newest exposure of the last
+/// configuration. Errors: kInvalid; kRefused: there is none; those of the store.
+Result<StoreReading> AskMeasurements(const ControlRequest& request, const FleetView& view);
 
 }  // namespace focalfleet

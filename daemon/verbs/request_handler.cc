@@ -17,30 +17,7 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint64_t kParameterRowsMax = 1000;
 constexpr double kWaitMaxS = 1e6;
-
-/// The newest value of each axis and parameter; `history` is newest first.
-Json NewestOf(const std::vector<ParameterHistory>& history) {
-  std::vector<ParameterHistory> newest;
-  for (const ParameterHistory& entry : history) {
-    const bool known = std::ranges::any_of(newest, [&](const ParameterHistory& other) {
-      return other.row.axis == entry.row.axis && other.row.parameter == entry.row.parameter;
-    });
-    if (!known) newest.push_back(entry);
-  }
-  return HistoryJson(newest);
-}
-
-/// The newest of each axis; `history` is newest first.
-Json NewestOf(const std::vector<TuningHistory>& history) {
-  std::vector<TuningHistory> newest;
-  for (const TuningHistory& entry : history)
-    if (std::ranges::none_of(
-            newest, [&](const TuningHistory& other) { return other.row.axis == entry.row.axis; }))
-      newest.push_back(entry);
-  return HistoryJson(newest);
-}
 
 /// The numbers of the units that the request chooses.
 Result<Json> AskSelection(const ControlRequest& request, const FleetView& view) {
@@ -48,6 +25,32 @@ Result<Json> AskSelection(const ControlRequest& request, const FleetView& view) 
   Json ids = Json::array();
   for (const PositionerIndex i : units) ids.push_back(view.layout->unit(i).id.value);
   return Json{{"unit_ids", std::move(ids)}};
+}
+
+Result<Json> AskUnit(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
+  return UnitJson(view, i);
+}
+
+/// Open alarms are known here, also where the store cannot be read.
+std::optional<Result<Json>> AskOpenAlarms(const ControlRequest& request,
+                                          const AlarmRegister& alarms) {
+  const auto all = FlagArgumentOr(request.args, "all", false);
+  if (all && *all) return std::nullopt;  // AskStore
+  const auto reading = AskAlarms(request, alarms, WallTime::Now());
+  if (!reading) return Result<Json>(tl::unexpected<Error>(reading.error()));
+  return (*reading)(nullptr);
+}
+
+/// The question to the store that the request asks; none: the verb asks nothing of it.
+std::optional<Result<StoreReading>> AskStore(const FleetView& view, const ControlRequest& request,
+                                             const AlarmRegister& alarms) {
+  if (request.verb == "params") return AskParameters(request, view);
+  if (request.verb == "history") return AskHistory(request, view);
+  if (request.verb == "events") return AskEvents(request, view);
+  if (request.verb == "alarms") return AskAlarms(request, alarms, WallTime::Now());
+  if (request.verb == "measurements") return AskMeasurements(request, view);
+  return std::nullopt;
 }
 
 /// The user of the client, by number: a name may be slow to find.
@@ -102,7 +105,8 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
     return Send(line.client, answer);
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
-  if (auto reading = AskStore(view, *request)) return Queue(pending, std::move(*reading));
+  if (auto reading = AskStore(view, *request, *options_.alarms))
+    return Queue(pending, std::move(*reading));
   if (request->verb == "wait") return Wait(view, *request, pending);
   if (request->verb == "preview") {
     const Status planned = Plan(view, *request, pending);
@@ -139,78 +143,11 @@ std::optional<Result<Json>> RequestHandler::Ask(const FleetView& view,
                                                 const ControlRequest& request) {
   if (request.verb == "status") return Result<Json>(StatusJson(view, options_.facts()));
   if (request.verb == "unit") return AskUnit(view, request);
-  if (request.verb == "alarms") return AskOpenAlarms(request);
+  if (request.verb == "alarms") return AskOpenAlarms(request, *options_.alarms);
   if (request.verb == "select") return AskSelection(request, view);
   if (request.verb == "model")
     return Result<Json>(options_.models->Show(ModelRegistry::kChangesMax));
   return std::nullopt;
-}
-
-Result<Json> RequestHandler::AskUnit(const FleetView& view, const ControlRequest& request) {
-  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
-  return UnitJson(view, i);
-}
-
-/// Open alarms are known here, also where the store cannot be read.
-std::optional<Result<Json>> RequestHandler::AskOpenAlarms(const ControlRequest& request) {
-  const auto all = FlagArgumentOr(request.args, "all", false);
-  if (all && *all) return std::nullopt;  // AskStore
-  const auto reading = AskAlarms(request, *options_.alarms, WallTime::Now());
-  if (!reading) return Result<Json>(tl::unexpected<Error>(reading.error()));
-  return (*reading)(nullptr);
-}
-
-std::optional<Result<StoreReading>> RequestHandler::AskStore(const FleetView& view,
-                                                             const ControlRequest& request) {
-  if (request.verb == "params") return AskParameters(view, request);
-  if (request.verb == "history") return AskHistory(request, view);
-  if (request.verb == "events") return AskEvents(request, view);
-  if (request.verb == "alarms") return AskAlarms(request, *options_.alarms, WallTime::Now());
-  if (request.verb == "measurements") return AskMeasurements(view, request);
-  return std::nullopt;
-}
-
-Result<StoreReading> RequestHandler::AskParameters(const FleetView& view,
-                                                   const ControlRequest& request) {
-  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
-  const UnitView& unit = view.coordinator->unit(i);
-  const SerialNumber serial = unit.bound_serial.value != 0 ? unit.bound_serial : unit.serial;
-  const Json known = UnitJson(view, i);
-  Json drive = {{"mode", known["mode"]}, {"v_bus_V", known["v_bus_V"]}};
-  for (const char* axis : {"theta", "phi"})
-    for (const char* name : {"counter1", "repeat", "subdivision"})
-      drive[std::string(axis) + "_" + name] = known[axis][name];
-  const std::uint32_t id = view.layout->unit(i).id.value;
-  return StoreReading([id, serial, drive](StoreReader* store) -> Result<Json> {
-    FOCALFLEET_TRY_ASSIGN(const auto history, store->Parameters(serial, kParameterRowsMax));
-    FOCALFLEET_TRY_ASSIGN(const auto tunings, store->Tunings(serial, kParameterRowsMax));
-    return Json{{"unit_id", id},
-                {"serial", serial.value},
-                {"drive", drive},  // effective values, stored or by default
-                {"parameters", NewestOf(history)},
-                {"tuning", NewestOf(tunings)},
-                {"tuning_history", HistoryJson(tunings)},
-                {"history", HistoryJson(history)}};
-  });
-}
-
-/// {exposure?}: without it, the newest exposure of the last configuration.
-Result<StoreReading> RequestHandler::AskMeasurements(const FleetView& view,
-                                                     const ControlRequest& request) {
-  FOCALFLEET_TRY_ASSIGN(const std::uint64_t asked, UnsignedArgumentOr(request.args, "exposure", 0));
-  const std::uint64_t configuration = view.coordinator->configuration().id;
-  return StoreReading([asked, configuration](StoreReader* store) -> Result<Json> {
-    std::uint64_t exposure = asked;
-    if (exposure == 0) {
-      FOCALFLEET_TRY_ASSIGN(const auto last, store->LastExposure(configuration));
-      if (!last) return Fail(ErrorCode::kRefused, "the last configuration was not measured");
-      exposure = *last;
-    }
-    FOCALFLEET_TRY_ASSIGN(const auto rows, store->Measurements(exposure));
-    if (rows.empty())
-      return Fail(ErrorCode::kRefused, "there is no exposure " + std::to_string(exposure));
-    return Json{{"exposure", exposure}, {"measurements", HistoryJson(rows)}};
-  });
 }
 
 /// The question waits for the reader's thread.

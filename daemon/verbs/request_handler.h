@@ -72,8 +72,8 @@ class RequestHandler {
   void PreviewDone(const FleetView& view, const PlanDone& done);
   /// The job that was taken found no room: its command is refused.
   void RefusePreview();
-  /// Hands questions to the store over, the oldest first, until `submit` finds no room. It takes
-  /// the question it is given only where it returns true.
+  /// Hands questions to the store over, the oldest first, until `submit` finds no room. A
+  /// question for which `submit` returns false is untouched.
   void SubmitQuestions(const std::function<bool(StoreQuestion*)>& submit);
   /// The client receives the store's answer.
   void Answered(const StoreAnswer& answer);
@@ -116,13 +116,6 @@ class RequestHandler {
   Status Plan(const FleetView& view, const ControlRequest& request, const Pending& pending);
   /// The answer to a question; none: the verb is no question.
   std::optional<Result<Json>> Ask(const FleetView& view, const ControlRequest& request);
-  Result<Json> AskUnit(const FleetView& view, const ControlRequest& request);
-  std::optional<Result<Json>> AskOpenAlarms(const ControlRequest& request);
-  /// The question to the store that the request asks; none: the verb asks nothing of it.
-  std::optional<Result<StoreReading>> AskStore(const FleetView& view,
-                                               const ControlRequest& request);
-  Result<StoreReading> AskParameters(const FleetView& view, const ControlRequest& request);
-  Result<StoreReading> AskMeasurements(const FleetView& view, const ControlRequest& request);
   void Queue(const Pending& pending, Result<StoreReading> reading);
   /// The command that keeps a change of the model; none: the verb changes no model.
   std::optional<Result<Command>> ChangeModel(const FleetView& view, const ControlRequest& request);

@@ -2,11 +2,12 @@
 
 namespace focalfleet {
 
-StoreAnswer StoreQuestions::Answer(const StoreQuestion& question, const std::atomic<bool>* ending) {
+StoreAnswer StoreQuestions::operator()(const StoreQuestion& question,
+                                       const std::atomic<bool>& ending) {
   const auto answer = [&]() -> Result<Json> {
     if (reader_ == nullptr) {
       FOCALFLEET_TRY_ASSIGN(reader_, StoreReader::Open(path_));
-      reader_->EndWith(ending);
+      reader_->EndWith(&ending);
     }
     return question.read(reader_.get());
   }();

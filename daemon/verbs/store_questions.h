@@ -31,12 +31,12 @@ struct StoreAnswer {
 class StoreQuestions {
  public:
   explicit StoreQuestions(std::string path) : path_(std::move(path)) {}
-  /// `ending` outlives this; once it is true the answer comes soon and says so.
-  StoreAnswer Answer(const StoreQuestion& question, const std::atomic<bool>* ending);
+  /// Once `ending` is true the answer comes soon and says so. Pre: `ending` is the same each time.
+  StoreAnswer operator()(const StoreQuestion& question, const std::atomic<bool>& ending);
 
  private:
   std::string path_;
-  std::unique_ptr<StoreReader> reader_;
+  std::shared_ptr<StoreReader> reader_;
 };
 
 }  // namespace focalfleet

@@ -314,8 +314,7 @@ TEST_F(RequestHandlerTest, QuestionsToTheStoreAreAnsweredByAnotherThread) {
   ASSERT_EQ(rest.size(), 2u);
   const std::atomic<bool> ending{false};
   StoreQuestions store(scratch_ / "none.db");
-  for (const StoreQuestion& question : handed_over)
-    handler_.Answered(store.Answer(question, &ending));
+  for (const StoreQuestion& question : handed_over) handler_.Answered(store(question, ending));
   TurnUntilQuiet();
   const std::string answers = client.Receive();
   EXPECT_EQ(std::ranges::count(answers, '\n'), 3) << answers;
