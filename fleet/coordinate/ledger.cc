@@ -13,7 +13,7 @@ MoveId MoveAfter(MoveId move, std::uint32_t count) {
   return {static_cast<std::uint16_t>((move.value + count - 1) % kIds + 1)};
 }
 
-/// What became of the thing that a condition is about, where it is there no more; else empty.
+/// The reason why a condition ends where the thing that it is about is there no more; else empty.
 std::string WhatLeft(const Layout& layout, const CoordinatorConfig& config, AlarmName name,
                      std::optional<UnitId> unit, std::optional<BusId> bus) {
   using enum AlarmName;

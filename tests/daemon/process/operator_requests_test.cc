@@ -116,8 +116,8 @@ TEST_F(OperatorRequests, ADryRunMovesAndStoresNothing) {
   ASSERT_TRUE(Ask("disable", {{"unit_ids", {2}}, {"reason", "bent"}}));
   const auto places = [&] { return (*Ask("state"))["rows"]; };
   const auto happened = [&] { return (*Ask("events"))["events"]; };
-  ASSERT_TRUE(WaitUntil([&] { return happened().dump().find("bent") != std::string::npos; },
-                        kPatienceMs));
+  ASSERT_TRUE(
+      WaitUntil([&] { return happened().dump().find("bent") != std::string::npos; }, kPatienceMs));
   const Json places_before = places();
   const Json happened_before = happened();
   const auto preview = Ask("preview", targets);

@@ -83,7 +83,9 @@ TEST_F(ServiceManagerTest, FeedsNothingWithoutAnInterval) {
   ASSERT_TRUE(Ask("apply", {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,40,90\n"}}));
   bool moved = false;
   bool ended = false;
-  for (auto message = manager_.Next(); message && !ended; message = manager_.Next()) {
+  while (!ended) {
+    const auto message = manager_.Next();
+    ASSERT_TRUE(message) << Log();
     EXPECT_EQ(message->find("WATCHDOG"), std::string::npos) << *message;
     moved |= message->find("configuration 1 is moving") != std::string::npos;
     const bool rests = message->find("2 of 2 units ready") != std::string::npos &&
