@@ -24,7 +24,7 @@ class Coordinator::Impl {
         units_(*layout, std::move(drives), {config.bit_rate_bps, config.data_bit_rate_bps}, stored,
                step_),
         timers_(layout->size()),
-        ledger_(*layout, std::move(stored), step_),
+        ledger_(*layout, config_, std::move(stored), step_),
         requests_(config_, step_, &units_, &timers_),
         traffic_(config_, step_, &units_),
         fleet_{*layout, config_, step_, units_, timers_, requests_, ledger_},

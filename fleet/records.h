@@ -202,6 +202,7 @@ struct AlarmEndRow {
   AlarmName name = AlarmName::kUnnamed;
   std::optional<UnitId> unit;
   std::optional<BusId> bus;
+  std::string reason = {};  // for people, where nobody has seen the condition end
 };
 
 /// An alarm from its first raise to its end. Equal alarms (of one name, unit and bus) that are

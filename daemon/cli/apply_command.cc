@@ -105,14 +105,23 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
   if (const auto targets = ReadTargets(*text, options.file)) {
     ReportPassedOver(context, options.file, targets->ignored_columns);
   }
-  if (options.dry_run)
-    return ReportDryRun(context, Ask(context, {.verb = "preview",
-                                               .args = {{"source", SourceOf(options.file)},
-                                                        {"targets_csv", std::move(*text)},
-                                                        {"fixed", options.fixed}},
-                                               .long_lasting = true}));
-  if (options.wait) InstallInterruptNote();
   ProgressBar bar(context);
+  if (options.dry_run) {
+    const auto planned =
+        Ask(context, {.verb = "preview",
+                      .args = {{"source", SourceOf(options.file)},
+                               {"targets_csv", std::move(*text)},
+                               {"fixed", options.fixed}},
+                      .long_lasting = true,
+                      .on_progress = [&bar](const Json& p) {
+                        bar.Show(0, "dry run: planning",
+                                 fmt::format("{} units, {:.0f} s", CountIn(p, "targeted"),
+                                             NumberIn(p, "elapsed_s")));
+                      }});
+    bar.End();
+    return ReportDryRun(context, planned);
+  }
+  if (options.wait) InstallInterruptNote();
   Question question{.verb = "apply",
                     .args = {{"source", SourceOf(options.file)},
                              {"targets_csv", std::move(*text)},

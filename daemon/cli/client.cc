@@ -47,8 +47,9 @@ tl::expected<Json, Failure> Ask(const Context& context, const Question& question
     // "Unavailable" from a daemon that listens means that the work began and a resource failed on
     // the way.
     const bool broken = answer.error().code == ErrorCode::kUnavailable;
-    return tl::unexpected<Failure>(
-        Failure{broken ? ExitCode::kBroken : ExitCode::kRefused, answer.error()});
+    return tl::unexpected<Failure>(Failure{.exit = broken ? ExitCode::kBroken : ExitCode::kRefused,
+                                           .error = answer.error(),
+                                           .answered = true});
   }
   if (ChangesNothing(question.verb)) {
     return tl::unexpected<Failure>(

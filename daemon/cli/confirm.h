@@ -9,8 +9,8 @@
 
 namespace focalfleet::cli {
 
-/// Disabling or adopting more units than this is asked about: so many are named one by one, more
-/// are chosen by a range or a bus that may be a slip.
+/// Disabling more units than this, or setting a parameter of more, is asked about: so many are
+/// named one by one, more are chosen by a range or a bus that may be a slip.
 inline constexpr std::size_t kUnitsUnasked = 10;
 
 /// None: go on. Otherwise the command ends with this refusal: a terminal said no, or there is no

@@ -64,19 +64,22 @@ void Show(const Context& context, const Json& events) {
 }
 
 /// Shows events as they come, until the daemon does not answer or stdout takes no more. With --json
-/// each event is an object of its own.
+/// each event is an object of its own. Each page goes on after the last one by the numbers of the
+/// store, so that none is left out however many come.
 ExitCode Follow(const Context& context, Json args) {
   for (;;) {
     const auto answer = Ask(context, {.verb = "events", .args = args});
     if (!answer) return Report(context, answer.error());
-    for (const Json& event : ListIn(*answer, "events")) {
+    if (!answer->contains("next"))
+      return Report(context, {ErrorCode::kUnavailable,
+                              "the daemon is of another version, whose events cannot be followed"});
+    for (const Json& event : ListIn(*answer, "events"))
       if (context.json) PrintJson(event);
-      if (event.contains("at_ns") && event["at_ns"].is_number_integer())
-        args["since_ns"] = event["at_ns"].get<std::int64_t>() + 1;
-    }
     Show(context, ListIn(*answer, "events"));
     if (OutputError() != 0) return ExitCode::kOk;  // Main reports it
-    std::this_thread::sleep_for(kFollowEvery);
+    args["after"] = (*answer)["next"];
+    for (const char* of_the_first : {"since_ns", "limit"}) args.erase(of_the_first);
+    if (!answer->value("more", false)) std::this_thread::sleep_for(kFollowEvery);
   }
 }
 

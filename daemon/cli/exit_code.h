@@ -19,6 +19,7 @@ enum class ExitCode : int {
 struct Failure {
   ExitCode exit = ExitCode::kRefused;
   Error error;
+  bool answered = false;  // the daemon said so, and can be asked something else
 };
 
 struct ExitCodeText {

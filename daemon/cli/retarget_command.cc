@@ -5,35 +5,45 @@
 
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
+#include "daemon/cli/each_unit.h"
+#include "daemon/control/id_ranges.h"
 
 namespace focalfleet::cli {
 namespace {
 
 struct RetargetOptions {
-  std::uint32_t unit_id = 0;
+  std::string units;  // as 7,20-25
   double first = 0;
   double second = 0;
   bool angles = false;
 };
 
 ExitCode RunRetarget(const Context& context, const RetargetOptions& options) {
-  const Json args{{"unit_id", options.unit_id},
-                  {options.angles ? "theta_deg" : "x_mm", options.first},
-                  {options.angles ? "phi_deg" : "y_mm", options.second}};
+  const auto units = ParseRanges(options.units);
+  if (!units) return Report(context, units.error(), ExitCode::kUsage);
+  if (units->size() > 1 && !options.angles)
+    return Report(context,
+                  {ErrorCode::kInvalid,
+                   "retarget: a place belongs to one unit; several units share --angles alone"},
+                  ExitCode::kUsage);
+  const auto tell = [&context](std::uint32_t id, Json* answer) {
+    const std::string text = TextIn(*answer, "text");
+    if (answer->value("goes", false)) {
+      Say(context, text);
+      return true;
+    }
+    // The unit was stopped for the new target, so the failure is no refusal that changed nothing.
+    Complain(fmt::format("focalfleet: unit {} does not go: {}\n", id, text));
+    return false;
+  };
   // The answer comes when the unit starts: it may have to stop first, and waits for other units
   // that stop.
-  const auto answer = Ask(context, {.verb = "retarget", .args = args, .long_lasting = true});
-  if (!answer) return Report(context, answer.error());
-  const bool goes = answer->value("goes", false);
-  const std::string text = answer->value("text", "");
-  if (context.json) PrintJson(*answer);
-  if (goes) {
-    Say(context, text);
-    return ExitCode::kOk;
-  }
-  // The unit was stopped for the new target, so the failure is no refusal that changed nothing.
-  Complain(fmt::format("focalfleet: unit {} does not go: {}\n", options.unit_id, text));
-  return ExitCode::kSomeUnserved;
+  return AskForEach(context, *units,
+                    {.verb = "retarget",
+                     .args = {{options.angles ? "theta_deg" : "x_mm", options.first},
+                              {options.angles ? "phi_deg" : "y_mm", options.second}},
+                     .long_lasting = true,
+                     .tell = tell});
 }
 
 }  // namespace
@@ -43,7 +53,8 @@ void AddRetargetCommand(CommandLine* line) {
       &line->app, "retarget", "Give one unit another target while the others move",
       "  focalfleet retarget 4711 103.25 -41.5\n  focalfleet retarget 4711 35 120 --angles");
   auto options = std::make_shared<RetargetOptions>();
-  command->add_option("UNIT", options->unit_id, "Its unit_id")->required();
+  command->add_option("UNIT", options->units, "Its unit_id; with --angles also 7,20-25")
+      ->required();
   command->add_option("X_MM", options->first, "Place in the focal plane")
       ->required()
       ->check(NumberBetween(-1e6, 1e6));

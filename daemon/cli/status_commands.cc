@@ -7,6 +7,7 @@
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/configuration_summary.h"
+#include "daemon/cli/each_unit.h"
 #include "daemon/cli/table.h"
 #include "daemon/cli/time_text.h"
 #include "daemon/cli/unit_choice.h"
@@ -116,19 +117,15 @@ void AddStatus(CommandLine* line) {
 
 // ---- unit
 
-/// Several units are one object with a list; a single one is an object of its own.
 ExitCode RunUnit(const Context& context, const UnitChoice& choice) {
   const auto ids = ChosenUnits(context, choice);
   if (!ids) return Report(context, ids.error());
-  Json units = Json::array();
-  for (const std::uint32_t id : *ids) {
-    const auto unit = Ask(context, {.verb = "unit", .args = {{"unit_id", id}}});
-    if (!unit) return Report(context, unit.error());
-    Say(context, (units.empty() ? "" : "\n") + DescribeObject(*unit));
-    units.push_back(*unit);
-  }
-  if (context.json) PrintJson(units.size() == 1 ? units.front() : Json{{"units", units}});
-  return ExitCode::kOk;
+  bool first = true;
+  const auto tell = [&](std::uint32_t, Json* answer) {
+    Say(context, (std::exchange(first, false) ? "" : "\n") + DescribeObject(*answer));
+    return true;
+  };
+  return AskForEach(context, *ids, {.verb = "unit", .tell = tell});
 }
 
 void AddUnit(CommandLine* line) {
@@ -238,8 +235,7 @@ void AddState(CommandLine* line) {
 // ---- history
 
 struct HistoryOptions {
-  std::uint32_t unit_id = 0;
-  bool of_unit = false;
+  UnitChoice choice;
   std::uint32_t limit = 20;
   std::string since;
   std::string until;
@@ -265,9 +261,20 @@ std::vector<HistoryTable> HistoryTables() {
       {"unit", {"at", "enabled", "reason", "unit_id", "serial"}}};
 }
 
+std::string DescribeHistory(const Json& history, bool colour_on) {
+  std::string text;
+  for (const HistoryTable& table : HistoryTables()) {
+    const Json& rows = ListIn(history, table.name);
+    if (rows.empty()) continue;
+    text +=
+        fmt::format("{}{}\n{}", text.empty() ? "" : "\n\n",
+                    Paint(colour_on, Colour::kBold, table.name), DescribeRows(rows, table.columns));
+  }
+  return text.empty() ? "nothing yet" : text;
+}
+
 ExitCode RunHistory(const Context& context, const HistoryOptions& options) {
   Json args{{"limit", options.limit}};
-  if (options.of_unit) args["unit_id"] = options.unit_id;
   if (!options.state.empty()) args["state"] = options.state;
   const WallTime now = WallTime::Now();
   const std::pair<const char*, const std::string&> times[] = {{"since_ns", options.since},
@@ -278,33 +285,29 @@ ExitCode RunHistory(const Context& context, const HistoryOptions& options) {
     if (!at) return Report(context, at.error());
     args[key] = at->ns;
   }
+  if (!options.choice.empty()) {
+    const auto units = ChosenUnits(context, options.choice);
+    if (!units) return Report(context, units.error());
+    const auto tell = [&](std::uint32_t id, Json* history) {
+      Say(context, (units->size() > 1 ? fmt::format("unit {}\n", id) : std::string()) +
+                       DescribeHistory(*history, context.colour_out));
+      return true;
+    };
+    return AskForEach(context, *units, {.verb = "history", .args = args, .tell = tell});
+  }
   const auto history = Ask(context, {.verb = "history", .args = args});
   if (!history) return Report(context, history.error());
   if (context.json) PrintJson(*history);
-  std::string text;
-  for (const HistoryTable& table : HistoryTables()) {
-    const Json& rows = ListIn(*history, table.name);
-    if (rows.empty()) continue;
-    text += fmt::format("{}{}\n{}", text.empty() ? "" : "\n\n",
-                        Paint(context.colour_out, Colour::kBold, table.name),
-                        DescribeRows(rows, table.columns));
-  }
-  Say(context, text.empty() ? "nothing yet" : text);
+  Say(context, DescribeHistory(*history, context.colour_out));
   return ExitCode::kOk;
 }
 
 void AddHistory(CommandLine* line) {
   CLI::App* command =
-      AddCommand(&line->app, "history", "Show past configurations, or the moves of a unit",
-                 "  focalfleet history\n  focalfleet history 4711 --limit 5");
+      AddCommand(&line->app, "history", "Show past configurations, or the moves of units",
+                 "  focalfleet history\n  focalfleet history 4711,4720-4722 --limit 5");
   auto options = std::make_shared<HistoryOptions>();
-  command->add_option_function<std::uint32_t>(
-      "UNIT",
-      [options](const std::uint32_t& id) {
-        options->unit_id = id;
-        options->of_unit = true;
-      },
-      "Its unit_id (default: configurations of the fleet)");
+  AddUnitNumbers(command, &options->choice, "Their unit_ids (default: the fleet's configurations)");
   command->add_option("--limit", options->limit, "Newest rows to show")->capture_default_str();
   command->add_option("--since", options->since, "Since then: 2h, or a time of UTC");
   command->add_option("--until", options->until, "Until then: 2h, or a time of UTC");

@@ -19,8 +19,12 @@ CLI::Validator Ranges() {
 
 }  // namespace
 
+CLI::Option* AddUnitNumbers(CLI::App* command, UnitChoice* choice, const std::string& help) {
+  return command->add_option("UNIT", choice->units, help)->check(Ranges());
+}
+
 void AddUnitChoice(CLI::App* command, UnitChoice* choice) {
-  command->add_option("UNIT", choice->units, "Their unit_ids: 7 9, or 7,20-25")->check(Ranges());
+  AddUnitNumbers(command, choice, "Their unit_ids: 7 9, or 7,20-25");
   command->add_option("--bus", choice->buses, "Only units on these buses: 3,5-7")->check(Ranges());
   command
       ->add_option("--state", choice->states,

@@ -22,6 +22,9 @@ struct UnitChoice {
 /// Adds UNIT..., --bus and --state to the command.
 void AddUnitChoice(CLI::App* command, UnitChoice* choice);
 
+/// Adds UNIT... alone, where --state means something else.
+CLI::Option* AddUnitNumbers(CLI::App* command, UnitChoice* choice, const std::string& help);
+
 /// The unit_ids. The daemon is asked only where a bus or a state is given. Errors: kUsage where
 /// nothing is given; those of the daemon.
 tl::expected<std::vector<std::uint32_t>, Failure> ChosenUnits(const Context& context,

@@ -10,6 +10,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/configuration_summary.h"
 #include "daemon/cli/confirm.h"
+#include "daemon/cli/each_unit.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
 #include "daemon/cli/unit_choice.h"
@@ -228,7 +229,6 @@ struct AdoptOptions {
   bool yes = false;
 };
 
-// Units are adopted one after the other; the first refusal ends it and is the answer.
 ExitCode RunAdopt(const Context& context, const AdoptOptions& options) {
   const auto units = ChosenUnits(context, options.choice);
   if (!units) return Report(context, units.error());
@@ -236,17 +236,15 @@ ExitCode RunAdopt(const Context& context, const AdoptOptions& options) {
       fmt::format("the hardware that answers at {} ({}) becomes their own",
                   Count(units->size(), "unit", "units"), DescribeRanges(*units, kRangesShown));
   if (const auto refused = Refused(what, options.yes)) return Report(context, *refused);
-  for (const std::uint32_t id : *units) {
-    const auto answer = Ask(context, {.verb = "adopt", .args = {{"unit_id", id}}});
-    if (!answer) return Report(context, answer.error());
+  const auto tell = [&context](std::uint32_t id, Json* answer) {
     std::string done =
         fmt::format("unit {}: the hardware that answers there belongs there now", id);
     if (const std::string text = TextIn(*answer, "text"); text.starts_with("done"))
       done += text.substr(4);
-    if (context.json && id == units->back()) PrintJson(*answer);
     Say(context, done);
-  }
-  return ExitCode::kOk;
+    return true;
+  };
+  return AskForEach(context, *units, {.verb = "adopt", .tell = tell});
 }
 
 void AddAdopt(CommandLine* line) {
@@ -267,6 +265,7 @@ struct ParamsOptions {
   std::string axis;
   std::string name;
   std::optional<std::int32_t> value;
+  bool yes = false;
 };
 
 std::vector<std::string> ParameterNames() {
@@ -277,21 +276,24 @@ std::vector<std::string> ParameterNames() {
   return names;
 }
 
-// Units are written one after the other; the first refusal ends it and is the answer.
 ExitCode SetParameter(const Context& context, const ParamsOptions& options,
                       const std::vector<std::uint32_t>& units) {
-  for (const std::uint32_t id : units) {
-    const Json args{{"unit_id", id},
-                    {"axis", options.axis},
-                    {"parameter", options.name},
-                    {"value", *options.value}};
-    // The unit decides: it may hold another value than the requested one.
-    const auto answer = Ask(context, {.verb = "params_set", .args = args});
-    if (!answer) return Report(context, answer.error());
-    if (context.json && id == units.back()) PrintJson(*answer);
-    Say(context, TextIn(*answer, "text"));
+  if (units.size() > kUnitsUnasked) {
+    const std::string what =
+        fmt::format("{} {} becomes {} in {} units ({})", options.axis, options.name, *options.value,
+                    units.size(), DescribeRanges(units, kRangesShown));
+    if (const auto refused = Refused(what, options.yes)) return Report(context, *refused);
   }
-  return ExitCode::kOk;
+  // The unit decides: it may hold another value than the requested one.
+  const auto tell = [&context](std::uint32_t, Json* answer) {
+    Say(context, TextIn(*answer, "text"));
+    return true;
+  };
+  return AskForEach(
+      context, units,
+      {.verb = "params_set",
+       .args = {{"axis", options.axis}, {"parameter", options.name}, {"value", *options.value}},
+       .tell = tell});
 }
 
 // The rows of stored or set parameters, then those of the defaults, narrowed to one axis and name
@@ -351,21 +353,17 @@ ExitCode RunParams(const Context& context, const ParamsOptions& options) {
   const auto units = ParseRanges(options.units);
   if (!units) return Report(context, units.error(), ExitCode::kUsage);
   if (set) return SetParameter(context, options, *units);
-  Json all = Json::array();
-  for (const std::uint32_t id : *units) {
-    const auto answer = Ask(context, {.verb = "params", .args = {{"unit_id", id}}});
-    if (!answer) return Report(context, answer.error());
+  const auto tell = [&](std::uint32_t id, Json* answer) {
     const Json rows = ParameterRows(*answer, options);
     const std::string tuning = options.name.empty() ? DescribeTuning(*answer, options) : "";
     Say(context, (units->size() > 1 ? fmt::format("unit {}\n", id) : std::string()) +
                      (rows.empty() ? "nothing is known of it: neither set nor read from the unit"
                                    : DescribeRows(rows, {"axis", "parameter", "value", "origin"})) +
                      tuning);
-    all.push_back(*answer);
-    all.back()["parameters"] = rows;
-  }
-  if (context.json) PrintJson(all.size() == 1 ? all.front() : Json{{"units", all}});
-  return ExitCode::kOk;
+    (*answer)["parameters"] = rows;
+    return true;
+  };
+  return AskForEach(context, *units, {.verb = "params", .tell = tell});
 }
 
 void AddParams(CommandLine* line) {
@@ -379,6 +377,7 @@ void AddParams(CommandLine* line) {
   OneOf(command->add_option("AXIS", options->axis, "Which axis"), {"theta", "phi"});
   OneOf(command->add_option("NAME", options->name, "Which parameter"), ParameterNames());
   command->add_option("VALUE", options->value, "Its new value, a whole number");
+  AddYes(command, &options->yes);
   OnChosen(line, command, options, RunParams);
 }
 

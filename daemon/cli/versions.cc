@@ -4,10 +4,11 @@
 
 #include "daemon/cli/client.h"
 #include "daemon/control/line_client.h"
+#include "daemon/usage/build_version.h"
 
 namespace focalfleet::cli {
 
-const char* ClientVersion() { return FOCALFLEET_VERSION; }
+const char* ClientVersion() { return BuildVersion(); }
 
 std::optional<std::string> DaemonVersion(const Context& context) {
   constexpr DurationNs kPatience = Seconds(2);

@@ -79,7 +79,7 @@ struct Facts {
   Result<DdsNeeds> dds;
   DaemonFacts daemon;
   Identity operator_user;  // this process
-  Identity daemon_user;    // the daemon's, else the owner of the store's folder
+  Identity daemon_user;    // as IdentityOfDaemon
 };
 
 }  // namespace focalfleet::doctor

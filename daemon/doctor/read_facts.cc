@@ -19,6 +19,8 @@
 namespace focalfleet::doctor {
 namespace {
 
+constexpr const char* kServiceUser = "focalfleet";  // deploy/systemd/focalfleetd.service.in
+
 std::string FolderOf(const std::string& file) {
   const std::string folder = std::filesystem::path(file).parent_path().string();
   return folder.empty() ? "." : folder;
@@ -111,6 +113,14 @@ Identity OwnIdentity() {
   return identity;
 }
 
+Identity IdentityOfDaemon(const Facts& facts, const char* service_user) {
+  if (facts.daemon.process) return facts.daemon.process->user;
+  if (facts.store_folder.trouble.empty() && !facts.store_folder.path.empty())
+    return IdentityOf(facts.store_folder.uid);
+  const passwd* const user = ::getpwnam(service_user);
+  return user != nullptr ? IdentityOf(user->pw_uid) : facts.operator_user;
+}
+
 Facts ReadFacts(const ReadOptions& options) {
   const Error unknown{ErrorCode::kUnavailable, "the configuration cannot be read"};
   Facts facts{.program_version = options.program_version,
@@ -134,8 +144,7 @@ Facts ReadFacts(const ReadOptions& options) {
   if (socket.empty())
     socket = facts.config ? facts.config->control.socket : options.socket_otherwise;
   facts.daemon = ReadDaemon(socket);
-  facts.daemon_user =
-      facts.daemon.process ? facts.daemon.process->user : IdentityOf(facts.store_folder.uid);
+  facts.daemon_user = IdentityOfDaemon(facts, kServiceUser);
   return facts;
 }
 

@@ -26,5 +26,8 @@ FileFacts LookAtFile(const std::string& path);
 /// The user and its groups, by the machine's list of users.
 Identity IdentityOf(std::uint32_t uid);
 Identity OwnIdentity();
+/// The user of a daemon that runs; else the owner of the store's folder; where there is no such
+/// folder yet, the user of the installed service; without one, this process.
+Identity IdentityOfDaemon(const Facts& facts, const char* service_user);
 
 }  // namespace focalfleet::doctor

@@ -51,6 +51,16 @@ void Log(const AlarmRow& alarm) {
   spdlog::log(LevelOf(alarm.severity), "alarm {} {}: {}", alarm.id, Name(alarm.name),
               TextOf(alarm));
 }
+/// An end that somebody has seen is in the log already, as what was seen.
+void Log(const AlarmEndRow& end) {
+  if (end.reason.empty()) return;
+  const WithFields fields({.message_id = kAlarmMessageId,
+                           .unit = end.unit,
+                           .bus = end.bus,
+                           .configuration = {},
+                           .alarm = Name(end.name)});
+  spdlog::info("alarm {} is over: {}", Name(end.name), end.reason);
+}
 void Log(const ConfigurationRow& row) {
   const WithFields fields(
       {.message_id = kConfigurationMessageId, .unit = {}, .bus = {}, .configuration = row.id});

@@ -186,6 +186,9 @@ void EventLoop::Gather() {
   if (parts_.troubles != nullptr) notes_ = parts_.troubles->TakeNotes();
   if (std::exchange(requests_ready_, false)) parts_.handler->Service(View(), &commands_);
   if (auto preview = parts_.handler->TakePreview()) SubmitPlan(std::move(*preview));
+  while (const auto answer = parts_.reader->Take()) parts_.handler->Answered(*answer);
+  parts_.handler->SubmitQuestions(
+      [this](StoreQuestion* question) { return parts_.reader->Submit(question); });
 }
 
 bool EventLoop::StepIsDue() const {

@@ -37,6 +37,7 @@ struct PlannerWork {
 };
 using PlannerThread = JobThread<PlannerWork, PlanDone>;
 using CameraThread = JobThread<CameraWork, ExposureDone>;
+using ReaderThread = JobThread<StoreQuestion, StoreAnswer>;
 
 class EventLoop {
  public:
@@ -51,11 +52,12 @@ class EventLoop {
     PlannerThread* planner = nullptr;
     CameraThread* camera = nullptr;  // none: neither camera nor sensors
     StoreThread* store = nullptr;
+    ReaderThread* reader = nullptr;
     StatusScheduler* scheduler = nullptr;  // none: DDS is off
     MetricsSampler* metrics = nullptr;     // none: no metrics are served
     SyncPulse* sync = nullptr;             // none: no SYNC line
     DdsTroubles* troubles = nullptr;       // none: no part has troubles to report
-    const EventSignal* threads = nullptr;  // raised by planner, camera, store
+    const EventSignal* threads = nullptr;  // raised by planner, camera, store, reader
     ServiceReport* service = nullptr;
     std::function<void()> hang_up;  // what SIGHUP asks for: the log is opened anew
     HostClock clock;

@@ -53,7 +53,7 @@ std::vector<usage::ManualPage> DaemonManual() {
       MakeDaemonCommandLine()->app,
       {.closing = kClosing,
        .section = 8,
-       .version = Version(),
+       .version = FOCALFLEET_VERSION,
        .description =
            {"focalfleetd moves the units of a focal plane over their CAN buses and keeps a record "
             "of every axis in a store that survives power cuts. focalfleet(1) asks and commands it "

@@ -23,8 +23,8 @@ namespace {
 /// Waits that cover the host's own processes stay the same in real time. A simulated fleet that
 /// runs faster does not make the host faster.
 void ScaleDefaults(double speed, CoordinatorConfig* timing) {
-  for (DurationNs* wait :
-       {&timing->reply_wait, &timing->start_delay, &timing->settle_margin, &timing->silence_limit})
+  for (DurationNs* wait : {&timing->reply_wait, &timing->start_delay, &timing->settle_margin,
+                           &timing->silence_limit, &timing->confirm_within})
     *wait = Seconds(wait->seconds() * std::max(1.0, speed));
 }
 

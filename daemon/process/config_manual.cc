@@ -78,7 +78,7 @@ std::vector<ConfigSection> DescribeConfig() {
 
 usage::ManualPage ConfigManual() {
   usage::Roff page(
-      {"focalfleet.toml", 5, std::string("focalfleet ") + Version(), "focalfleet manual"},
+      {"focalfleet.toml", 5, std::string("focalfleet ") + FOCALFLEET_VERSION, "focalfleet manual"},
       "configuration of focalfleetd");
   page.Section("DESCRIPTION");
   page.Paragraph(

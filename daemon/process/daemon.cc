@@ -25,6 +25,7 @@
 #include "daemon/store/store.h"
 #include "daemon/store/store_reader.h"
 #include "daemon/systemd/notify_socket.h"
+#include "daemon/usage/build_version.h"
 #include "daemon/verbs/alarm_register.h"
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/model_upkeep.h"
@@ -73,6 +74,11 @@ struct Measuring {
   std::unique_ptr<CameraWorker> camera;          // none: there is no camera
   std::unique_ptr<FibreCarrierWorker> carriers;  // none: no unit has sensors of its own
   std::unique_ptr<CameraThread> thread;          // none: neither camera nor sensors
+};
+
+struct StoreThreads {
+  std::unique_ptr<StoreThread> writer;
+  std::unique_ptr<ReaderThread> reader;
 };
 
 /// Numbers for /metrics. The counters are kept also where there is no endpoint.
@@ -147,7 +153,7 @@ class Daemon {
   Metrics metrics_;
   std::unique_ptr<Coordinator> coordinator_;
   std::unique_ptr<BusLines> lines_;
-  std::unique_ptr<StoreThread> store_thread_;
+  StoreThreads stored_;
   std::unique_ptr<PlannerThread> planner_;
   std::unique_ptr<ModelRegistry> models_;
   AlarmRegister alarms_;
@@ -312,7 +318,7 @@ std::function<void()> Daemon::Answering(Heartbeat* heartbeat) {
 }
 
 Status Daemon::StartThreads() {
-  FOCALFLEET_TRY_ASSIGN(store_thread_, StoreThread::Create(StoreSinks(), signal_.get()));
+  FOCALFLEET_TRY_ASSIGN(stored_.writer, StoreThread::Create(StoreSinks(), signal_.get()));
   FOCALFLEET_TRY_ASSIGN(
       planner_, PlannerThread::Create(
                     [this, alive = Answering(&service_.planner)](const PlannerWork& work,
@@ -320,6 +326,9 @@ Status Daemon::StartThreads() {
                       return Plan(work, ending, alive);
                     },
                     signal_.get(), {.name = "planner", .alive = Answering(&service_.planner)}));
+  // The watchdog does not wait for the reader: a long question must not restart the daemon.
+  FOCALFLEET_TRY_ASSIGN(stored_.reader, ReaderThread::Create(StoreQuestions(config_.store.path),
+                                                             signal_.get(), {.name = "reader"}));
   if (measuring_.camera != nullptr || measuring_.carriers != nullptr) {
     FOCALFLEET_TRY_ASSIGN(
         measuring_.thread,
@@ -341,7 +350,8 @@ Status Daemon::StartThreads() {
                                                   .alarms = &alarms_,
                                                   .planner = planner_.get(),
                                                   .camera = measuring_.thread.get(),
-                                                  .store = store_thread_.get(),
+                                                  .store = stored_.writer.get(),
+                                                  .reader = stored_.reader.get(),
                                                   .scheduler = status_.scheduler.get(),
                                                   .metrics = metrics_.sampler.get(),
                                                   .sync = sync_.get(),
@@ -374,7 +384,7 @@ void Daemon::OpenService() {
   const auto interval = WatchdogInterval(environment);
   if (interval && service_.socket.present()) {
     std::vector<Watchdog::Thread> threads = {
-        {"store", &service_.store, [this] { store_thread_->Wake(); }},
+        {"store", &service_.store, [this] { stored_.writer->Wake(); }},
         {"planner", &service_.planner, [this] { planner_->Wake(); }}};
     if (measuring_.thread != nullptr)
       threads.push_back({"camera", &service_.camera, [this] { measuring_.thread->Wake(); }});
@@ -411,13 +421,14 @@ Status Daemon::Run() {
 /// daemon, and the socket is gone. Parts that may hang end meanwhile, or are left behind.
 Status Daemon::End() {
   const SlowEnd slow_end(&service_.socket,
-                         {.progress = [this] { return store_thread_->committed_through(); }});
+                         {.progress = [this] { return stored_.writer->committed_through(); }});
   ending_ = std::make_unique<BoundedEnd>(
       std::vector<BoundedEnd::Part>{{"the buses", [this] { lines_.reset(); }},
                                     {"the planner", [this] { planner_.reset(); }},
                                     {"the camera", [this] { measuring_.thread.reset(); }},
                                     {"the metrics", [this] { metrics_.endpoint.reset(); }}});
-  const Status stored = store_thread_->Finish();
+  const Status stored = stored_.writer->Finish();
+  stored_.reader.reset();  // soon: a question that runs is cut short
   handler_->Close();
   status_.publisher.reset();
   store_.reset();
@@ -441,8 +452,8 @@ ShellFacts Daemon::Facts() const {
   const AlarmRegister::Counts alarms = alarms_.Count(WallTime::Now());
   facts.alarms = {alarms.open, alarms.muted, alarms.worst ? Name(*alarms.worst) : ""};
   facts.store_path = config_.store.path;
-  facts.store_failing = store_thread_->failing();
-  facts.batches_waiting = store_thread_->waiting();
+  facts.store_failing = stored_.writer->failing();
+  facts.batches_waiting = stored_.writer->waiting();
   facts.store.transactions = metrics_.work.transactions;
   facts.store.rows = metrics_.work.rows;
   facts.dds_enabled = status_.publisher != nullptr;
@@ -460,7 +471,7 @@ ShellFacts Daemon::Facts() const {
 
 }  // namespace
 
-const char* Version() { return FOCALFLEET_VERSION; }
+const char* Version() { return BuildVersion(); }
 
 DaemonEnd RunDaemon(const DaemonConfig& config) {
   EventLoop::BlockSignals();

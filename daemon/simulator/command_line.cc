@@ -15,6 +15,7 @@
 #include "daemon/simulator/interface_names.h"
 #include "daemon/simulator/simulator.h"
 #include "daemon/simulator/subcommands.h"
+#include "daemon/usage/build_version.h"
 #include "daemon/usage/complaint.h"
 #include "daemon/usage/help.h"
 
@@ -190,7 +191,7 @@ std::unique_ptr<CommandTree> MakeCommandTree() {
       "SIGTERM. It prints `ready` when all of them are open.");
   app.formatter(std::make_shared<usage::HelpFormatter>(kClosing));
   app.set_help_flag("-h,--help", "Show this help");
-  app.set_version_flag("--version", FOCALFLEET_VERSION, "Show the version");
+  app.set_version_flag("--version", BuildVersion(), "Show the version");
   app.require_subcommand(0, 1);
   AddRunOptions(&app, &tree->given);
   tree->subcommands = AddSubcommands(&app, &tree->given);

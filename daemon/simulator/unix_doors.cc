@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "daemon/control/unix_address.h"
 #include "daemon/ports/socket_frames.h"
@@ -48,40 +49,70 @@ Result<std::unique_ptr<UnixDoors>> UnixDoors::Create(const Options& options) {
   const int epoll = ::epoll_create1(EPOLL_CLOEXEC);
   if (epoll < 0) return Unavailable(options.directory, "no epoll");
   std::unique_ptr<UnixDoors> doors(new UnixDoors(epoll));
-  for (const BusId bus : options.buses)
-    FOCALFLEET_TRY(
-        doors->Listen(options.directory + "/bus" + std::to_string(bus.value) + ".sock", bus));
+  for (const BusId bus : options.buses) {
+    doors->listeners_.push_back(
+        {.bus = bus, .path = options.directory + "/bus" + std::to_string(bus.value) + ".sock"});
+    FOCALFLEET_TRY(doors->Listen(doors->listeners_.size() - 1));
+  }
   return doors;
 }
 
 UnixDoors::~UnixDoors() {
   for (const auto& [id, client] : clients_) ::close(client.fd);
   for (const Listener& listener : listeners_) {
+    if (listener.fd < 0) continue;  // the path may be another's
     ::close(listener.fd);
     ::unlink(listener.path.c_str());
   }
   ::close(epoll_);
 }
 
-Status UnixDoors::Listen(const std::string& path, BusId bus) {
+Status UnixDoors::Listen(std::size_t listener) {
+  const std::string& path = listeners_[listener].path;
   FOCALFLEET_TRY_ASSIGN(const UnixAddress address, UnixAddress::Of(path));
   if (HasListener(address))
     return Fail(ErrorCode::kRefused, path + " is in use: another simulation answers there");
   ::unlink(path.c_str());
   const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd < 0) return Unavailable(path, "no socket");
-  if (::bind(fd, address.get(), address.length()) != 0 || ::chmod(path.c_str(), 0660) != 0 ||
-      ::listen(fd, 16) != 0) {
-    const auto error = Unavailable(path, "cannot listen");
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = kListenerTag | listener;
+  const char* const failed = ::bind(fd, address.get(), address.length()) != 0 ||
+                                     ::chmod(path.c_str(), 0660) != 0 || ::listen(fd, 16) != 0
+                                 ? "cannot listen"
+                             : ::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0 ? "cannot watch"
+                                                                                   : nullptr;
+  if (failed != nullptr) {
+    const auto error = Unavailable(path, failed);
     ::close(fd);
     return error;
   }
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.u64 = kListenerTag | listeners_.size();
-  listeners_.push_back({bus, path, fd});
-  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) return Unavailable(path, "cannot watch");
+  listeners_[listener].fd = fd;
   return {};
+}
+
+void UnixDoors::FollowBuses(const HostClock& clock, const sim::World& world) {
+  // A revived bus is noticed so soon; until then nothing else might wake the doors.
+  constexpr DurationNs kLookEvery = Milliseconds(100);
+  wake_at_ = kNever;
+  for (std::size_t n = 0; n < listeners_.size(); ++n) {
+    Listener& listener = listeners_[n];
+    if (!world.dead(listener.bus)) {
+      if (listener.fd >= 0) continue;
+      const Status open = Listen(n);
+      if (!open && !std::exchange(listener.reported, true))
+        std::fprintf(stderr, "focalfleet-sim: %s\n", open.error().text.c_str());
+      if (open) listener.reported = false;
+    } else if (listener.fd >= 0) {
+      const std::vector<std::uint32_t> clients = clients_of_bus_[listener.bus];
+      for (const std::uint32_t id : clients) Drop(id, "");
+      ::close(listener.fd);
+      ::unlink(listener.path.c_str());
+      listener.fd = -1;
+    }
+    if (listener.fd < 0) wake_at_ = clock.Now() + clock.Real(kLookEvery);
+  }
 }
 
 void UnixDoors::Accept(std::size_t listener) {
@@ -176,6 +207,7 @@ void UnixDoors::Exchange(const HostClock& clock, sim::World* world) {
   const HostInstant at = clock.Now();
   for (std::size_t i = 0; i < received_.size(); ++i)
     world->Inject(received_[i].bus, received_[i].frame, at, senders_[i]);
+  FollowBuses(clock, *world);
   SetPace(world);
 }
 

@@ -4,6 +4,9 @@
 //
 // While a bus has many frames waiting its clients are not read, so they follow the pace of the bus.
 // A client that does not read its frames is dropped, which is reported on stderr.
+//
+// The socket of a dead bus is gone, so its clients see the link down as they would see an interface
+// that left, until the bus is revived.
 #pragma once
 
 #include <deque>
@@ -30,7 +33,7 @@ class UnixDoors : public BusDoors {
   ~UnixDoors() override;
 
   [[nodiscard]] int fd() const override { return epoll_; }
-  [[nodiscard]] HostInstant wake_at() const override { return kNever; }
+  [[nodiscard]] HostInstant wake_at() const override { return wake_at_; }
   void Exchange(const HostClock& clock, sim::World* world) override;
   void Carry(std::span<const sim::WireFrame> frames) override;
 
@@ -38,7 +41,8 @@ class UnixDoors : public BusDoors {
   struct Listener {
     BusId bus;
     std::string path;
-    int fd = -1;
+    int fd = -1;            // below 0: the bus is dead
+    bool reported = false;  // that it cannot be opened again
   };
   struct Client {
     std::uint32_t id = 0;
@@ -49,7 +53,8 @@ class UnixDoors : public BusDoors {
   };
 
   explicit UnixDoors(int epoll) : epoll_(epoll) {}
-  Status Listen(const std::string& path, BusId bus);
+  Status Listen(std::size_t listener);
+  void FollowBuses(const HostClock& clock, const sim::World& world);
   void Accept(std::size_t listener);
   void Read(Client* client);
   void Write(Client* client);
@@ -58,6 +63,7 @@ class UnixDoors : public BusDoors {
   void SetPace(sim::World* world);
 
   int epoll_;
+  HostInstant wake_at_ = kNever;
   std::vector<Listener> listeners_;
   std::map<BusId, std::vector<std::uint32_t>> clients_of_bus_;
   std::map<std::uint32_t, Client> clients_;

@@ -69,7 +69,7 @@ std::string NextStep(const FleetView& view, const ShellFacts& facts) {
     return Line("home", units.lost, "--not-known") + " --wait" + why;
   }
   if (!units.silent.empty())
-    return Line("unit", units.silent, "--state silent") + "  (" +
+    return Line("unit", units.silent, "--state silent --state absent") + "  (" +
            Are(units.silent.size(), "not heard") + ")";
   if (facts.alarms.open > 0) return "focalfleet alarms";
   return "focalfleet apply FILE --dry-run";

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/clock/wall_time.h"
 #include "fleet/records.h"
@@ -55,11 +56,28 @@ struct AlarmHistory {
 
 /// A change of a place: bound to a serial number, disabled, enabled.
 struct UnitHistory {
+  std::uint64_t entry = 0;
   UnitId unit;
   SerialNumber serial;
   bool enabled = true;
   std::string reason;
   WallTime at;
+};
+
+/// Numbers of the newest entries of each kind. Numbers only grow, whatever the clock does.
+struct EntryNumbers {
+  std::uint64_t alarm = 0;
+  std::uint64_t unit = 0;
+  std::uint64_t begun = 0;  // configuration that began
+  std::uint64_t ended = 0;  // configuration that is over
+};
+
+/// Entries after some numbers, the oldest first.
+struct EntriesAfter {
+  std::vector<AlarmHistory> alarms;
+  std::vector<UnitHistory> units;
+  std::vector<ConfigurationHistory> begun;
+  std::vector<ConfigurationHistory> ended;
 };
 
 struct MeasurementHistory {

@@ -86,6 +86,59 @@ MoveHistory ReadMove(Cells& cells) {
   return move;
 }
 
+static_assert(IsOver(ConfigurationState{3}) && !IsOver(ConfigurationState{2}));
+constexpr const char* kIsOver = "AND state >= 3 ";
+constexpr const char* kLastEnded =
+    "SELECT coalesce(max(id), 0) FROM configuration WHERE state >= 3";
+
+Result<std::vector<ConfigurationHistory>> QueryConfigurations(Connection& connection,
+                                                              const Conditions& conditions,
+                                                              const std::string& order,
+                                                              std::uint32_t limit) {
+  const std::string sql =
+      "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
+      "makespan_s, energy_J, "
+      "peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, began_ns, changed_ns "
+      "FROM configuration " +
+      conditions.where + "ORDER BY id " + order + " LIMIT ?1";
+  return Query<ConfigurationHistory>(connection, "configuration", sql.c_str(), limit,
+                                     conditions.filters, [](Cells& cells) {
+                                       ConfigurationHistory entry;
+                                       entry.row = ReadConfiguration(cells);
+                                       entry.began = cells.Time(15);
+                                       entry.changed = cells.Time(16);
+                                       return entry;
+                                     });
+}
+
+Result<std::vector<AlarmHistory>> QueryAlarms(Connection& connection, const Conditions& conditions,
+                                              const std::string& order, std::uint32_t limit) {
+  const std::string sql = "SELECT id, severity, unit_id, bus_id, text, name, at_ns FROM alarm " +
+                          conditions.where + "ORDER BY " + order + " LIMIT ?1";
+  return Query<AlarmHistory>(connection, "alarm", sql.c_str(), limit, conditions.filters,
+                             [](Cells& cells) {
+                               return AlarmHistory{ReadAlarm(cells), cells.Time(6)};
+                             });
+}
+
+Result<std::vector<UnitHistory>> QueryUnits(Connection& connection, const Conditions& conditions,
+                                            const std::string& order, std::uint32_t limit) {
+  const std::string sql =
+      "SELECT entry, unit_id, serial, enabled, reason, at_ns FROM unit_history " +
+      conditions.where + "ORDER BY entry " + order + " LIMIT ?1";
+  return Query<UnitHistory>(connection, "unit_history", sql.c_str(), limit, conditions.filters,
+                            [](Cells& cells) {
+                              UnitHistory entry;
+                              entry.entry = cells.Whole<std::uint64_t>(0);
+                              entry.unit = {cells.Whole<std::uint32_t>(1)};
+                              entry.serial = {cells.Whole<std::uint32_t>(2)};
+                              entry.enabled = cells.Flag(3);
+                              entry.reason = cells.Text(4);
+                              entry.at = cells.Time(5);
+                              return entry;
+                            });
+}
+
 }  // namespace
 
 StoreReader::StoreReader() = default;
@@ -137,20 +190,7 @@ Result<std::vector<ConfigurationHistory>> StoreReader::Configurations(
   Conditions conditions;
   conditions.Add(period, "changed_ns");
   if (state) conditions.Add("state =", static_cast<std::int64_t>(*state));
-  const std::string sql =
-      "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
-      "makespan_s, energy_J, "
-      "peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, began_ns, changed_ns "
-      "FROM configuration " +
-      conditions.where + "ORDER BY id DESC LIMIT ?1";
-  return Query<ConfigurationHistory>(*connection_, "configuration", sql.c_str(), limit,
-                                     conditions.filters, [](Cells& cells) {
-                                       ConfigurationHistory entry;
-                                       entry.row = ReadConfiguration(cells);
-                                       entry.began = cells.Time(15);
-                                       entry.changed = cells.Time(16);
-                                       return entry;
-                                     });
+  return QueryConfigurations(*connection_, conditions, "DESC", limit);
 }
 
 Result<std::vector<ParameterHistory>> StoreReader::Parameters(SerialNumber serial,
@@ -186,13 +226,9 @@ Result<std::vector<TuningHistory>> StoreReader::Tunings(SerialNumber serial, std
 }
 
 Result<std::vector<AlarmHistory>> StoreReader::Alarms(std::uint32_t limit, const Period& period) {
-  return Query<AlarmHistory>(
-      *connection_, "alarm",
-      "SELECT id, severity, unit_id, bus_id, text, name, at_ns FROM alarm "
-      "WHERE at_ns >= ?2 AND at_ns < ?3 ORDER BY at_ns DESC, id DESC LIMIT ?1",
-      limit, {period.since.ns, period.until.ns}, [](Cells& cells) {
-        return AlarmHistory{ReadAlarm(cells), cells.Time(6)};
-      });
+  Conditions conditions;
+  conditions.Add(period, "at_ns");
+  return QueryAlarms(*connection_, conditions, "at_ns DESC, id DESC", limit);
 }
 
 Result<std::vector<OpenAlarmRow>> StoreReader::EarlierAlarms(std::uint32_t limit,
@@ -320,22 +356,53 @@ Result<std::string> StoreReader::ModelText(const std::string& sha256) {
 
 Result<std::vector<UnitHistory>> StoreReader::Units(std::optional<UnitId> unit, std::uint32_t limit,
                                                     const Period& period) {
-  static const std::string kColumns =
-      "SELECT entry, unit_id, serial, enabled, reason, at_ns FROM unit_history ";
   Conditions conditions;
   conditions.Add(unit);
   conditions.Add(period, "at_ns");
-  const std::string sql = kColumns + conditions.where + "ORDER BY entry DESC LIMIT ?1";
-  return Query<UnitHistory>(*connection_, "unit_history", sql.c_str(), limit, conditions.filters,
-                            [](Cells& cells) {
-                              UnitHistory entry;
-                              entry.unit = {cells.Whole<std::uint32_t>(1)};
-                              entry.serial = {cells.Whole<std::uint32_t>(2)};
-                              entry.enabled = cells.Flag(3);
-                              entry.reason = cells.Text(4);
-                              entry.at = cells.Time(5);
-                              return entry;
-                            });
+  return QueryUnits(*connection_, conditions, "DESC", limit);
+}
+
+Result<EntryNumbers> StoreReader::NewestEntries() {
+  EntryNumbers newest;
+  const std::pair<const char*, std::uint64_t*> kinds[] = {
+      {"SELECT coalesce(max(id), 0) FROM alarm", &newest.alarm},
+      {"SELECT coalesce(max(entry), 0) FROM unit_history", &newest.unit},
+      {"SELECT coalesce(max(id), 0) FROM configuration", &newest.begun},
+      {kLastEnded, &newest.ended}};
+  for (const auto& [sql, number] : kinds) {
+    FOCALFLEET_TRY_ASSIGN(const std::int64_t found, connection_->Integer(sql));
+    *number = static_cast<std::uint64_t>(found);
+  }
+  return newest;
+}
+
+Result<EntriesAfter> StoreReader::After(const EntryNumbers& numbers, std::uint32_t limit) {
+  const auto after = [](const char* column, std::uint64_t number) {
+    Conditions conditions;
+    conditions.Add(std::string(column) + " >", static_cast<std::int64_t>(number));
+    return conditions;
+  };
+  EntriesAfter entries;
+  FOCALFLEET_TRY_ASSIGN(entries.alarms,
+                        QueryAlarms(*connection_, after("id", numbers.alarm), "id ASC", limit));
+  FOCALFLEET_TRY_ASSIGN(entries.units,
+                        QueryUnits(*connection_, after("entry", numbers.unit), "ASC", limit));
+  FOCALFLEET_TRY_ASSIGN(
+      entries.begun, QueryConfigurations(*connection_, after("id", numbers.begun), "ASC", limit));
+  Conditions over = after("id", numbers.ended);
+  over.where += kIsOver;
+  FOCALFLEET_TRY_ASSIGN(entries.ended, QueryConfigurations(*connection_, over, "ASC", limit));
+  return entries;
+}
+
+void StoreReader::EndWith(const std::atomic<bool>* ending) {
+  // Some 100 us between two looks: an end does not wait for a question.
+  constexpr int kInstructions = 10'000;
+  const auto ends = [](void* flag) {
+    return static_cast<const std::atomic<bool>*>(flag)->load() ? 1 : 0;
+  };
+  sqlite3_progress_handler(connection_->db(), kInstructions, ends,
+                           const_cast<std::atomic<bool>*>(ending));
 }
 
 }  // namespace focalfleet

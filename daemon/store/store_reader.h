@@ -2,6 +2,7 @@
 // needs to go on. A reader has a connection of its own; any number may read, in any process.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -60,6 +61,11 @@ class StoreReader {
   Result<std::string> ModelText(const std::string& sha256);
   Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit,
                                          const Period& period = {});
+  Result<EntryNumbers> NewestEntries();
+  /// At most `limit` of each kind, the oldest first.
+  Result<EntriesAfter> After(const EntryNumbers& numbers, std::uint32_t limit);
+  /// Queries end with kUnavailable once `ending` is true. Pre: `ending` outlives them.
+  void EndWith(const std::atomic<bool>* ending);
 
  private:
   StoreReader();

@@ -43,6 +43,25 @@ Json JsonOf(const MuteRow& row, std::size_t open) {
           {"open", open}};
 }
 
+Json AlarmsJson(const std::vector<OpenAlarmRow>& rows, Severity least, const AlarmRegister& alarms,
+                WallTime now) {
+  Json list = Json::array();
+  for (const OpenAlarmRow& row : rows)
+    if (row.severity >= least) list.push_back(JsonOf(row, alarms.IsMuted(row.name, now)));
+  Json mutes = Json::array();
+  const std::vector<OpenAlarmRow> lasting = alarms.Lasting();
+  for (const MuteRow& mute : alarms.Mutes(now))
+    mutes.push_back(JsonOf(
+        mute, static_cast<std::size_t>(std::ranges::count_if(lasting, [&](const OpenAlarmRow& row) {
+          return row.name == mute.name && row.state == OpenAlarmRow::State::kOpen;
+        }))));
+  const AlarmRegister::Counts counts = alarms.Count(now);
+  return {{"open", counts.open},
+          {"muted", counts.muted},
+          {"alarms", std::move(list)},
+          {"mutes", std::move(mutes)}};
+}
+
 Result<std::vector<std::uint64_t>> Ids(const Json& args) {
   if (!args.contains("ids")) return std::vector<std::uint64_t>();
   FOCALFLEET_TRY_ASSIGN(const auto ids, UnsignedListArgument(args, "ids"));
@@ -73,7 +92,8 @@ Result<Command> Acknowledge(const Json& args, AlarmRegister* alarms, const std::
   FOCALFLEET_TRY_ASSIGN(const auto names, Names(args));
   FOCALFLEET_TRY_ASSIGN(auto rows, alarms->Acknowledge(ids, names, by, now));
   const std::string count = std::to_string(rows.size());
-  return Keep(std::move(rows), "acknowledged " + count);
+  return Keep(std::move(rows),
+              count + (count == "1" ? " alarm is" : " alarms are") + " acknowledged");
 }
 
 Result<Command> Mute(const Json& args, AlarmRegister* alarms, const std::string& by, WallTime now) {
@@ -96,43 +116,30 @@ Result<Command> Unmute(const Json& args, AlarmRegister* alarms, const std::strin
 
 }  // namespace
 
-Result<Json> AskAlarms(const ControlRequest& request, const AlarmRegister& alarms,
-                       const OpenReader& reader, WallTime now) {
+Result<StoreReading> AskAlarms(const ControlRequest& request, const AlarmRegister& alarms,
+                               WallTime now) {
   const Json& args = request.args;
   FOCALFLEET_TRY_ASSIGN(const bool all, FlagArgumentOr(args, "all", false));
   FOCALFLEET_TRY_ASSIGN(const std::uint64_t limit,
                         UnsignedArgumentOr(args, "limit", kEarlierAlarmsMax));
   FOCALFLEET_TRY_ASSIGN(const Severity least, SeverityArgumentOr(args, Severity::kInfo));
   FOCALFLEET_TRY_ASSIGN(const Period period, PeriodArgument(args));
-  std::vector<OpenAlarmRow> rows = alarms.Lasting();
-  std::erase_if(rows, [&](const OpenAlarmRow& row) {
-    return row.last_unix_ns < period.since.ns ||
-           (!all && row.state == OpenAlarmRow::State::kAcknowledged);
+  return StoreReading([all, least, period, now, alarms,
+                       earlier_most = static_cast<std::uint32_t>(std::min(
+                           limit, kEarlierAlarmsMax))](StoreReader* store) -> Result<Json> {
+    std::vector<OpenAlarmRow> rows = alarms.Lasting();
+    std::erase_if(rows, [&](const OpenAlarmRow& row) {
+      return row.last_unix_ns < period.since.ns ||
+             (!all && row.state == OpenAlarmRow::State::kAcknowledged);
+    });
+    if (all) {
+      FOCALFLEET_TRY_ASSIGN(auto earlier, store->EarlierAlarms(earlier_most, period));
+      rows.insert(rows.begin(), std::make_move_iterator(earlier.rbegin()),
+                  std::make_move_iterator(earlier.rend()));
+      std::ranges::stable_sort(rows, {}, &OpenAlarmRow::id);
+    }
+    return AlarmsJson(rows, least, alarms, now);
   });
-  if (all) {
-    FOCALFLEET_TRY_ASSIGN(StoreReader* const store, reader());
-    FOCALFLEET_TRY_ASSIGN(
-        auto earlier, store->EarlierAlarms(
-                          static_cast<std::uint32_t>(std::min(limit, kEarlierAlarmsMax)), period));
-    rows.insert(rows.begin(), std::make_move_iterator(earlier.rbegin()),
-                std::make_move_iterator(earlier.rend()));
-    std::ranges::stable_sort(rows, {}, &OpenAlarmRow::id);
-  }
-  Json list = Json::array();
-  for (const OpenAlarmRow& row : rows)
-    if (row.severity >= least) list.push_back(JsonOf(row, alarms.IsMuted(row.name, now)));
-  Json mutes = Json::array();
-  const std::vector<OpenAlarmRow> lasting = alarms.Lasting();
-  for (const MuteRow& mute : alarms.Mutes(now))
-    mutes.push_back(JsonOf(
-        mute, static_cast<std::size_t>(std::ranges::count_if(lasting, [&](const OpenAlarmRow& row) {
-          return row.name == mute.name && row.state == OpenAlarmRow::State::kOpen;
-        }))));
-  const AlarmRegister::Counts counts = alarms.Count(now);
-  return Json{{"open", counts.open},
-              {"muted", counts.muted},
-              {"alarms", std::move(list)},
-              {"mutes", std::move(mutes)}};
 }
 
 std::optional<Result<Command>> ChangeAlarms(const ControlRequest& request, AlarmRegister* alarms,

@@ -12,9 +12,10 @@
 namespace focalfleet {
 
 /// The answer to `alarms`. Arguments: {all?, since_ns?, severity?, limit?}. With `all`, alarms that
-/// are over come from the store. Errors: kInvalid names the argument; those of the store.
-Result<Json> AskAlarms(const ControlRequest& request, const AlarmRegister& alarms,
-                       const OpenReader& reader, WallTime now);
+/// are over come from the store; without it the store is not read, and may be null. Errors:
+/// kInvalid names the argument; those of the store.
+Result<StoreReading> AskAlarms(const ControlRequest& request, const AlarmRegister& alarms,
+                               WallTime now);
 
 /// The command that keeps what an operator does about alarms; none: the verb is another one.
 /// Verbs: alarms_ack {ids?, names?}, alarms_mute {name, for_s, reason}, alarms_unmute {name}. `by`

@@ -17,30 +17,7 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint64_t kParameterRowsMax = 1000;
 constexpr double kWaitMaxS = 1e6;
-
-/// The newest value of each axis and parameter; `history` is newest first.
-Json NewestOf(const std::vector<ParameterHistory>& history) {
-  std::vector<ParameterHistory> newest;
-  for (const ParameterHistory& entry : history) {
-    const bool known = std::ranges::any_of(newest, [&](const ParameterHistory& other) {
-      return other.row.axis == entry.row.axis && other.row.parameter == entry.row.parameter;
-    });
-    if (!known) newest.push_back(entry);
-  }
-  return HistoryJson(newest);
-}
-
-/// The newest of each axis; `history` is newest first.
-Json NewestOf(const std::vector<TuningHistory>& history) {
-  std::vector<TuningHistory> newest;
-  for (const TuningHistory& entry : history)
-    if (std::ranges::none_of(
-            newest, [&](const TuningHistory& other) { return other.row.axis == entry.row.axis; }))
-      newest.push_back(entry);
-  return HistoryJson(newest);
-}
 
 /// The numbers of the units that the request chooses.
 Result<Json> AskSelection(const ControlRequest& request, const FleetView& view) {
@@ -48,6 +25,32 @@ Result<Json> AskSelection(const ControlRequest& request, const FleetView& view) 
   Json ids = Json::array();
   for (const PositionerIndex i : units) ids.push_back(view.layout->unit(i).id.value);
   return Json{{"unit_ids", std::move(ids)}};
+}
+
+Result<Json> AskUnit(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
+  return UnitJson(view, i);
+}
+
+/// Open alarms are known here, also where the store cannot be read.
+std::optional<Result<Json>> AskOpenAlarms(const ControlRequest& request,
+                                          const AlarmRegister& alarms) {
+  const auto all = FlagArgumentOr(request.args, "all", false);
+  if (all && *all) return std::nullopt;  // AskStore
+  const auto reading = AskAlarms(request, alarms, WallTime::Now());
+  if (!reading) return Result<Json>(tl::unexpected<Error>(reading.error()));
+  return (*reading)(nullptr);
+}
+
+/// The question to the store that the request asks; none: the verb asks nothing of it.
+std::optional<Result<StoreReading>> AskStore(const FleetView& view, const ControlRequest& request,
+                                             const AlarmRegister& alarms) {
+  if (request.verb == "params") return AskParameters(request, view);
+  if (request.verb == "history") return AskHistory(request, view);
+  if (request.verb == "events") return AskEvents(request, view);
+  if (request.verb == "alarms") return AskAlarms(request, alarms, WallTime::Now());
+  if (request.verb == "measurements") return AskMeasurements(request, view);
+  return std::nullopt;
 }
 
 /// The user of the client, by number: a name may be slow to find.
@@ -102,6 +105,8 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
     return Send(line.client, answer);
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
+  if (auto reading = AskStore(view, *request, *options_.alarms))
+    return Queue(pending, std::move(*reading));
   if (request->verb == "wait") return Wait(view, *request, pending);
   if (request->verb == "preview") {
     const Status planned = Plan(view, *request, pending);
@@ -130,7 +135,7 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
   pending.note = NoteOn(view, *command);
   command->request = next_request_++;
   pending_.emplace(command->request, pending);
-  waiting_ += pending.wait ? 1u : 0u;
+  waiting_ += pending.gets_progress() ? 1u : 0u;
   commands->push_back(std::move(*command));
 }
 
@@ -138,60 +143,34 @@ std::optional<Result<Json>> RequestHandler::Ask(const FleetView& view,
                                                 const ControlRequest& request) {
   if (request.verb == "status") return Result<Json>(StatusJson(view, options_.facts()));
   if (request.verb == "unit") return AskUnit(view, request);
-  if (request.verb == "params") return AskParameters(view, request);
-  const OpenReader reader = [this] { return Reader(); };
-  if (request.verb == "history") return AskHistory(request, view, reader);
-  if (request.verb == "events") return AskEvents(request, view, reader);
+  if (request.verb == "alarms") return AskOpenAlarms(request, *options_.alarms);
   if (request.verb == "select") return AskSelection(request, view);
-  if (request.verb == "alarms")
-    return AskAlarms(
-        request, *options_.alarms, [this] { return Reader(); }, WallTime::Now());
-  if (request.verb == "measurements") return AskMeasurements(view, request);
   if (request.verb == "model")
     return Result<Json>(options_.models->Show(ModelRegistry::kChangesMax));
   return std::nullopt;
 }
 
-Result<Json> RequestHandler::AskUnit(const FleetView& view, const ControlRequest& request) {
-  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
-  return UnitJson(view, i);
+/// The question waits for the reader's thread.
+void RequestHandler::Queue(const Pending& pending, Result<StoreReading> reading) {
+  if (!reading) return Answer(pending, tl::unexpected<Error>(std::move(reading).error()));
+  if (asked_.size() >= limits::kControlClients)  // each client has one, and most wait for it
+    return Answer(pending, Fail(ErrorCode::kFull, std::to_string(asked_.size()) +
+                                                      " questions wait for the store; ask again "
+                                                      "when they are answered"));
+  const std::uint64_t number = next_request_++;
+  asked_.emplace(number, pending);
+  questions_.push_back({number, pending.id, std::move(*reading)});
 }
 
-Result<Json> RequestHandler::AskParameters(const FleetView& view, const ControlRequest& request) {
-  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
-  const UnitView& unit = view.coordinator->unit(i);
-  const SerialNumber serial = unit.bound_serial.value != 0 ? unit.bound_serial : unit.serial;
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(const auto history, reader->Parameters(serial, kParameterRowsMax));
-  FOCALFLEET_TRY_ASSIGN(const auto tunings, reader->Tunings(serial, kParameterRowsMax));
-  const Json known = UnitJson(view, i);
-  Json drive = {{"mode", known["mode"]}, {"v_bus_V", known["v_bus_V"]}};
-  for (const char* axis : {"theta", "phi"})
-    for (const char* name : {"counter1", "repeat", "subdivision"})
-      drive[std::string(axis) + "_" + name] = known[axis][name];
-  return Json{{"unit_id", view.layout->unit(i).id.value},
-              {"serial", serial.value},
-              {"drive", std::move(drive)},  // effective values, stored or by default
-              {"parameters", NewestOf(history)},
-              {"tuning", NewestOf(tunings)},
-              {"tuning_history", HistoryJson(tunings)},
-              {"history", HistoryJson(history)}};
+void RequestHandler::SubmitQuestions(const std::function<bool(StoreQuestion*)>& submit) {
+  while (!questions_.empty() && submit(&questions_.front())) questions_.pop_front();
 }
 
-/// {exposure?}: without it, the newest exposure of the last configuration.
-Result<Json> RequestHandler::AskMeasurements(const FleetView& view, const ControlRequest& request) {
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(std::uint64_t exposure, UnsignedArgumentOr(request.args, "exposure", 0));
-  if (exposure == 0) {
-    FOCALFLEET_TRY_ASSIGN(const auto last,
-                          reader->LastExposure(view.coordinator->configuration().id));
-    if (!last) return Fail(ErrorCode::kRefused, "the last configuration was not measured");
-    exposure = *last;
-  }
-  FOCALFLEET_TRY_ASSIGN(const auto rows, reader->Measurements(exposure));
-  if (rows.empty())
-    return Fail(ErrorCode::kRefused, "there is no exposure " + std::to_string(exposure));
-  return Json{{"exposure", exposure}, {"measurements", HistoryJson(rows)}};
+void RequestHandler::Answered(const StoreAnswer& answer) {
+  const auto it = asked_.find(answer.number);
+  if (it == asked_.end()) return;
+  Send(it->second.client, answer.line);
+  asked_.erase(it);
 }
 
 std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view,
@@ -269,7 +248,7 @@ void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
   it->second.began = true;
   if (!reply.last && (pending.wait || pending.is_retarget)) return;
   pending_.erase(it);
-  waiting_ -= pending.wait ? 1u : 0u;
+  waiting_ -= pending.gets_progress() ? 1u : 0u;
   if (reply.error) {
     options_.log("refused or failed: " + reply.error->text);
     if (pending.is_retarget && pending.began)
@@ -333,8 +312,10 @@ Status RequestHandler::Plan(const FleetView& view, const ControlRequest& request
                         CommandOf({.id = request.id, .verb = "apply", .args = request.args}, view));
   FOCALFLEET_TRY_ASSIGN(Preview preview,
                         view.coordinator->PreviewOf(std::get<ApplyCommand>(command.what)));
-  dry_run_ = {
-      .pending = pending, .targeted = preview.targeted, .refused = std::move(preview.refused)};
+  dry_run_ = {.pending = pending,
+              .targeted = preview.targeted,
+              .refused = std::move(preview.refused),
+              .since = view.now};
   preview_job_ = std::move(preview.job);
   return {};
 }
@@ -356,17 +337,30 @@ void RequestHandler::RefusePreview() {
 }
 
 void RequestHandler::ShowProgress(const FleetView& view) {
-  if (waiting_ == 0) return;
-  AnswerWaiters(view);
-  if (view.now < progress_at_) return;
+  if (waiting_ > 0) AnswerWaiters(view);
+  if ((waiting_ == 0 && !dry_run_) || view.now < progress_at_) return;
   progress_at_ = view.now + options_.progress_period;
+  if (dry_run_) {
+    const double second = static_cast<double>(options_.second.ns);
+    const Json planning{
+        {"state", Name(ConfigurationState::kPlanning)},
+        {"dry_run", true},
+        {"targeted", dry_run_->targeted},
+        {"elapsed_s", static_cast<double>((view.now - dry_run_->since).ns) / second}};
+    server_.Progress(dry_run_->pending.client, EncodeProgress(dry_run_->pending.id, planning));
+  }
+  if (waiting_ == 0) return;
   const Json progress = ProgressJson(view);
   for (const auto& [request, pending] : pending_)
-    if (pending.wait) server_.Progress(pending.client, EncodeProgress(pending.id, progress));
+    if (pending.gets_progress())
+      server_.Progress(pending.client, EncodeProgress(pending.id, progress));
 }
 
 void RequestHandler::Close() {
   if (dry_run_) pending_.emplace(next_request_++, std::exchange(dry_run_, std::nullopt)->pending);
+  pending_.merge(asked_);  // their numbers are from one series
+  questions_.clear();
+  asked_.clear();
   for (const auto& [request, pending] : pending_)
     Answer(pending,
            Fail(ErrorCode::kUnavailable,

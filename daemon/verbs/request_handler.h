@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <optional>
 #include <string>
@@ -27,6 +28,7 @@
 #include "daemon/store/store_reader.h"
 #include "daemon/verbs/alarm_register.h"
 #include "daemon/verbs/model_registry.h"
+#include "daemon/verbs/store_questions.h"
 #include "fleet/coordinate/preview.h"
 #include "fleet/coordinator.h"
 
@@ -70,12 +72,19 @@ class RequestHandler {
   void PreviewDone(const FleetView& view, const PlanDone& done);
   /// The job that was taken found no room: its command is refused.
   void RefusePreview();
+  /// Hands questions to the store over, the oldest first, until `submit` finds no room. A
+  /// question for which `submit` returns false is untouched.
+  void SubmitQuestions(const std::function<bool(StoreQuestion*)>& submit);
+  /// The client receives the store's answer.
+  void Answered(const StoreAnswer& answer);
   /// Clients that wait receive progress, when it is time, or the end that they wait for.
   void ShowProgress(const FleetView& view);
   /// The instant at which ShowProgress is due; kNever while no client waits.
-  [[nodiscard]] HostInstant wake_at() const { return waiting_ > 0 ? progress_at_ : kNever; }
+  [[nodiscard]] HostInstant wake_at() const {
+    return waiting_ > 0 || dry_run_ ? progress_at_ : kNever;
+  }
   /// All clients that wait receive that the daemon ends, and the store's reader is closed, so that
-  /// the writer closes last and leaves one file.
+  /// the writer closes last and leaves one file. Pre: the reader's thread has ended.
   void Close();
 
  private:
@@ -89,12 +98,15 @@ class RequestHandler {
     std::string note;              // stands after the answer's text
     std::uint64_t awaits = 0;      // of `wait`: the configuration whose end is the answer
     HostInstant give_up = kNever;  // of `wait`
+    /// Its answer may take minutes: progress shows the client that the daemon lives.
+    [[nodiscard]] bool gets_progress() const { return wait || is_retarget; }
   };
   /// A dry run while the planner has it.
   struct DryRun {
     Pending pending;
     std::uint32_t targeted = 0;
     std::vector<Preview::Refused> refused = {};
+    HostInstant since;
   };
 
   void Handle(const FleetView& view, const IncomingLine& line, std::vector<Command>* commands);
@@ -104,9 +116,7 @@ class RequestHandler {
   Status Plan(const FleetView& view, const ControlRequest& request, const Pending& pending);
   /// The answer to a question; none: the verb is no question.
   std::optional<Result<Json>> Ask(const FleetView& view, const ControlRequest& request);
-  Result<Json> AskUnit(const FleetView& view, const ControlRequest& request);
-  Result<Json> AskParameters(const FleetView& view, const ControlRequest& request);
-  Result<Json> AskMeasurements(const FleetView& view, const ControlRequest& request);
+  void Queue(const Pending& pending, Result<StoreReading> reading);
   /// The command that keeps a change of the model; none: the verb changes no model.
   std::optional<Result<Command>> ChangeModel(const FleetView& view, const ControlRequest& request);
   [[nodiscard]] std::string NoteOn(const FleetView& view, const Command& command) const;
@@ -116,10 +126,12 @@ class RequestHandler {
 
   LineServer server_;
   Options options_;
-  std::unique_ptr<StoreReader> reader_;  // opened with the first question that needs it
+  std::unique_ptr<StoreReader> reader_;  // of changes of the model; opened with the first
+  std::deque<StoreQuestion> questions_;  // not handed over yet
+  std::unordered_map<std::uint64_t, Pending> asked_;    // by the number of the question
   std::unordered_map<std::uint64_t, Pending> pending_;  // by the coordinator's request number
   std::uint64_t next_request_ = 1;
-  std::size_t waiting_ = 0;  // entries of pending_ with `wait`
+  std::size_t waiting_ = 0;  // entries of pending_ that get progress
   HostInstant progress_at_{0};
   std::vector<IncomingLine> stops_;
   bool stopped_ = false;         // the last turn handled stops alone

@@ -17,10 +17,12 @@ using Phase = ConfigurationPhase;
 
 constexpr DurationNs kGatherStep = Milliseconds(50);
 
-/// The unit has not had the chance to answer, or is being read.
+/// The unit has not had the chance to answer, is being read, or is taking a parameter that plans
+/// depend on.
 bool IsAwaited(const UnitRecord& unit) {
   return unit.view.phase == kIdentifying || (unit.view.phase == kAbsent && !unit.asked_once) ||
-         unit.view.phase == kSettling;
+         unit.view.phase == kSettling || unit.request.write_request != 0 ||
+         !unit.request.waiting_writes.empty();
 }
 
 }  // namespace

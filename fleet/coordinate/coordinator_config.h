@@ -28,6 +28,10 @@ struct CoordinatorConfig {
   DurationNs transmit_horizon =
       Milliseconds(4);  // how far ahead of the bit clock frames are released
   DurationNs silence_limit = Milliseconds(3000);  // without an answer: silent
+  /// In this time a new daemon has found buses and DDS as they are: a link is reported when its
+  /// port is opened, and the first attempt to join DDS takes 5 s of real time at most. Half would
+  /// end the alarm of a slow joining too early; twice as much would only show an old one longer.
+  DurationNs confirm_within = Milliseconds(10'000);
   /// With a SYNC line an edge signals the common start. Start frames then name an instant
   /// `sync_lead` after it, for units that have no such line or miss the edge.
   bool sync_line = false;

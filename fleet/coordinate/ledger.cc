@@ -1,5 +1,6 @@
 #include "fleet/coordinate/ledger.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "protocol/base/limits.h"
@@ -7,21 +8,35 @@
 namespace focalfleet {
 namespace {
 
-/// The time in which a new daemon has found buses and DDS as they are: a link is reported when its
-/// port is opened, and the first attempt to join DDS takes 5 s at most. Half would end the alarm of
-/// a slow joining too early; twice as much would only show an old one longer.
-constexpr DurationNs kConfirmWithin = Seconds(10);
-
 MoveId MoveAfter(MoveId move, std::uint32_t count) {
   constexpr std::uint32_t kIds = 65'535;  // 0 is none
   return {static_cast<std::uint16_t>((move.value + count - 1) % kIds + 1)};
 }
 
+/// The reason why a condition ends where the thing that it is about is there no more; else empty.
+std::string WhatLeft(const Layout& layout, const CoordinatorConfig& config, AlarmName name,
+                     std::optional<UnitId> unit, std::optional<BusId> bus) {
+  using enum AlarmName;
+  const auto place = unit ? layout.Find(*unit) : std::nullopt;
+  if (unit && !place) return "unit " + std::to_string(unit->value) + " left the layout";
+  if (bus && std::ranges::find(layout.buses(), *bus) == layout.buses().end())
+    return "bus " + std::to_string(bus->value) + " left the layout";
+  if (!config.has_camera &&
+      (name == kCameraLate || name == kCameraFailed || name == kExposureRefused))
+    return "the camera left the configuration";
+  if (place && (name == kSensorsSilent || name == kSensorsDoubted) &&
+      (!config.reads_sensors || layout.unit(*place).sensors == 0))
+    return "the sensors of unit " + std::to_string(unit->value) + " left the configuration";
+  return {};
+}
+
 }  // namespace
 
-Ledger::Ledger(const Layout& layout, StoredFleet stored, const StepState& step)
+Ledger::Ledger(const Layout& layout, const CoordinatorConfig& config, StoredFleet stored,
+               const StepState& step)
     : earlier_configurations(std::move(stored.configurations)),
       layout_(layout),
+      config_(config),
       step_(step),
       next_configuration_(stored.next_configuration),
       next_alarm_(stored.next_alarm),
@@ -83,13 +98,31 @@ void Ledger::End(AlarmName name, std::optional<PositionerIndex> unit, std::optio
 // A bus that is up, or DDS that works, is reported by nobody. An alarm of an earlier run about them
 // is over where this run does not raise it again.
 void Ledger::EndUnconfirmed() {
-  if (confirm_until_ == kNever) confirm_until_ = step_.now + kConfirmWithin;
+  if (confirm_until_ == kNever) {
+    confirm_until_ = step_.now + config_.confirm_within;
+    EndOfWhatLeft();
+  }
   if (unconfirmed_.empty() || step_.now < confirm_until_) return;
   for (const Condition& condition : unconfirmed_) {
     conditions_.erase(condition);
     Note(AlarmEndRow{condition.name, condition.unit, condition.bus});
   }
   unconfirmed_.clear();
+}
+
+// Nobody will see these conditions end.
+void Ledger::EndOfWhatLeft() {
+  for (auto it = conditions_.begin(); it != conditions_.end();) {
+    const Condition condition = *it;
+    std::string why = WhatLeft(layout_, config_, condition.name, condition.unit, condition.bus);
+    if (why.empty()) {
+      ++it;
+      continue;
+    }
+    it = conditions_.erase(it);
+    unconfirmed_.erase(condition);
+    Note(AlarmEndRow{condition.name, condition.unit, condition.bus, std::move(why)});
+  }
 }
 
 void Ledger::ReplyWhenDurable(std::uint64_t request, std::string text) {

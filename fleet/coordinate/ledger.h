@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "fleet/coordinate/coordinator_config.h"
 #include "fleet/coordinate/step_state.h"
 #include "fleet/layout.h"
 #include "fleet/records.h"
@@ -21,8 +22,9 @@ namespace focalfleet {
 
 class Ledger {
  public:
-  /// `layout` and `step` outlive the ledger.
-  Ledger(const Layout& layout, StoredFleet stored, const StepState& step);
+  /// `layout`, `config` and `step` outlive the ledger.
+  Ledger(const Layout& layout, const CoordinatorConfig& config, StoredFleet stored,
+         const StepState& step);
 
   template <class AnyRow>
   void Note(AnyRow&& row) {
@@ -84,8 +86,12 @@ class Ledger {
 
   void ReserveMoves();
   void EndUnconfirmed();
+  /// Conditions of units, buses, sensors and a camera that an earlier run had and this one has not
+  /// are over.
+  void EndOfWhatLeft();
 
   const Layout& layout_;
+  const CoordinatorConfig& config_;
   const StepState& step_;
   std::uint64_t committed_through_ = 0;
   bool store_failing_ = false;

@@ -2,10 +2,12 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "fleet/coordinate/count_setting.h"
 #include "fleet/coordinate/identification.h"
 #include "fleet/coordinate/unit_knowledge.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 namespace {
@@ -41,6 +43,12 @@ void OnWritten(const Coordination& fleet, PositionerIndex i, const ParameterRepl
   }
 }
 
+/// The unit rests, or a parameter may be what helps it.
+bool TakesParameters(const UnitRecord& record) {
+  return record.view.phase == kReady ||
+         (record.view.phase == kFault && !record.trouble.unfit.empty());
+}
+
 }  // namespace
 
 void OnParameter(const Coordination& fleet, PositionerIndex i, const ParameterReply& reply) {
@@ -67,16 +75,27 @@ void OnParameter(const Coordination& fleet, PositionerIndex i, const ParameterRe
 
 Status WriteParameter(const Coordination& fleet, std::uint64_t request,
                       const WriteParameterCommand& command) {
-  const UnitRecord& record = fleet.units[command.unit];
-  const UnitPhase phase = record.view.phase;
-  const bool misfit = phase == kFault && !record.trouble.unfit.empty();  // a parameter may help it
-  if ((phase != kReady && !misfit) || record.request.question)
-    return Fail(ErrorCode::kRefused, fleet.units.NameOf(command.unit) +
-                                         " takes parameters only at rest; its phase is " +
-                                         Name(phase));
-  fleet.requests.Ask(command.unit, ParameterWrite{command.axis, command.parameter, command.value});
-  fleet.units[command.unit].request.write_request = request;
+  UnitRecord& record = fleet.units[command.unit];
+  std::vector<ParameterOrder>& waiting = record.request.waiting_writes;
+  if (!TakesParameters(record) && record.view.phase != kIdentifying)
+    return Fail(ErrorCode::kRefused, fleet.units.WhyNoParameters(command.unit));
+  if (waiting.size() >= limits::kControlClients)  // each client has one, and most wait for it
+    return Fail(ErrorCode::kFull, fleet.units.NameOf(command.unit) + " has " +
+                                      std::to_string(waiting.size()) +
+                                      " parameters to write already; go on when they are answered");
+  waiting.push_back({request, {command.axis, command.parameter, command.value}});
+  if (!record.request.question) fleet.timers.Set(command.unit, fleet.now());
   return {};
+}
+
+void WriteNext(const Coordination& fleet, PositionerIndex i) {
+  UnitRecord& record = fleet.units[i];
+  if (!TakesParameters(record)) return fleet.units.RefuseWrites(i);
+  std::vector<ParameterOrder>& waiting = record.request.waiting_writes;
+  const ParameterOrder order = waiting.front();
+  waiting.erase(waiting.begin());
+  fleet.requests.Ask(i, order.write);
+  record.request.write_request = order.request;
 }
 
 }  // namespace focalfleet

@@ -11,8 +11,13 @@
 namespace focalfleet {
 
 void OnParameter(const Coordination& fleet, PositionerIndex i, const ParameterReply& reply);
-/// The reply to `request` comes when the unit has answered, with the value that holds then.
+/// Asks the unit to take the value, after its open question and parameters that wait already, or
+/// when it has been read. The reply to `request` comes when the unit has answered, with the value
+/// that holds then. Errors: kRefused: the unit does not rest; kFull.
 Status WriteParameter(const Coordination& fleet, std::uint64_t request,
                       const WriteParameterCommand& command);
+/// Writes the parameter that has waited longest. Pre: one waits, no question is open, and the unit
+/// is not being read.
+void WriteNext(const Coordination& fleet, PositionerIndex i);
 
 }  // namespace focalfleet

@@ -58,4 +58,10 @@ constexpr bool IsLoaded(UnitPhase phase) {
   return (Bits({kStaging, kConfirming, kArming, kArmed}) & Bit(phase)) != 0;
 }
 
+/// A parameter may wait in this phase to be written: the unit rests, or is just being read.
+constexpr bool MayWriteLater(UnitPhase phase) {
+  using enum UnitPhase;
+  return (Bits({kIdentifying, kReady, kFault}) & Bit(phase)) != 0;
+}
+
 }  // namespace focalfleet

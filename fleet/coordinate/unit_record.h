@@ -36,12 +36,21 @@ struct Question {
   HostInstant suspect_at = kNever;
 };
 
+/// A parameter that a command wants written; `request` is answered when the unit has answered.
+struct ParameterOrder {
+  std::uint64_t request = 0;
+  ParameterWrite write;
+};
+
 /// State of the questions to one unit (requests.h).
 struct RequestState {
   std::uint8_t sequence = 0;  // of the last question; 0: none yet
   std::optional<Question> question;
   HostInstant answered_asked{INT64_MIN};  // when the question answered last was asked
   std::uint64_t write_request = 0;  // the command that waits for the answer to a written parameter
+  /// Parameters to write when the open question is answered, in their order. They outlive an
+  /// identification; any other end of rest refuses them (UnitTable::SetPhase).
+  std::vector<ParameterOrder> waiting_writes;
   // Stops of this host, so that a stop of another host is recognised.
   /// Sequence numbers of the last stops, newest first: answers may come late, and repeated.
   std::array<std::uint8_t, 4> stop_sequences{};

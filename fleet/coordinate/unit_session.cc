@@ -68,6 +68,10 @@ void UnitSessions::Service(PositionerIndex i) {
     WriteCount(fleet_, i);
     return;
   }
+  if (record.view.phase != kIdentifying && !record.request.waiting_writes.empty()) {
+    WriteNext(fleet_, i);
+    if (record.request.question) return;
+  }
   const bool poll = fleet_.now() >= record.next_poll;
   switch (record.view.phase) {
     case kAbsent:
@@ -82,6 +86,8 @@ void UnitSessions::Service(PositionerIndex i) {
       return;
     case kIdentifying:
       AskNext(fleet_, i);
+      if (!record.request.waiting_writes.empty() && !record.request.question)
+        fleet_.timers.Set(i, fleet_.now());  // it was read, and is served again
       return;
     case kForeign:
     case kFault:

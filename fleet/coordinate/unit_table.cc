@@ -118,7 +118,21 @@ void UnitTable::SetPhase(PositionerIndex i, UnitPhase phase) {
   view.phase = phase;
   if (phase == UnitPhase::kMoving || phase == UnitPhase::kHoming)
     units_[i.value].motion.runs_freely = true;
+  if (!MayWriteLater(phase)) RefuseWrites(i);
   Changed(i);
+}
+
+std::string UnitTable::WhyNoParameters(PositionerIndex i) const {
+  return NameOf(i) + " takes parameters only at rest; its phase is " +
+         Name(units_[i.value].view.phase);
+}
+
+void UnitTable::RefuseWrites(PositionerIndex i) {
+  std::vector<ParameterOrder>& orders = units_[i.value].request.waiting_writes;
+  for (const ParameterOrder& order : orders)
+    step_.out->replies.push_back(
+        {order.request, true, Error{ErrorCode::kRefused, WhyNoParameters(i)}, {}});
+  orders.clear();
 }
 
 void UnitTable::Changed(PositionerIndex i) {

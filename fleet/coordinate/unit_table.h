@@ -47,7 +47,12 @@ class UnitTable {
   /// "which belongs to no unit".
   [[nodiscard]] std::string WhoseSerial(PositionerIndex i) const;
 
-  /// Pre: IsAllowed.
+  /// Why the unit takes no parameters, as a sentence.
+  [[nodiscard]] std::string WhyNoParameters(PositionerIndex i) const;
+  /// Refuses the parameters that wait to be written.
+  void RefuseWrites(PositionerIndex i);
+
+  /// Refuses waiting parameters where the unit rests no more. Pre: IsAllowed.
   void SetPhase(PositionerIndex i, UnitPhase phase);
   /// Adds the unit to Effects::changed, once a step.
   void Changed(PositionerIndex i);

@@ -21,7 +21,10 @@
 #include "daemon/control/line_buffer.h"
 #include "daemon/control/messages.h"
 #include "daemon/control/printable.h"
+#include "daemon/verbs/alarm_requests.h"
+#include "daemon/verbs/history_requests.h"
 #include "daemon/verbs/requested_command.h"
+#include "daemon/verbs/unit_selection.h"
 #include "protocol/base/check.h"
 #include "tests/daemon/verbs/small_fleet.h"
 
@@ -60,6 +63,35 @@ void CheckUnits(const Command& command) {
       command.what);
 }
 
+/// The verbs about the past, about alarms and about a choice of units take any arguments, too.
+void TryQuestions(ControlRequest request, const FleetView& view) {
+  constexpr WallTime kNow{1'700'000'000'000'000'000};
+  AlarmRegister alarms;
+  std::vector<Row> rows{
+      AlarmRow{4, Severity::kError, UnitId{1}, {}, "silent", AlarmName::kUnitSilent}};
+  alarms.Take(kNow, &rows);
+  const auto explained = [](const auto& answer) {
+    FOCALFLEET_CHECK(answer || !answer.error().text.empty());
+  };
+  explained(AskHistory(request, view));
+  explained(AskEvents(request, view));
+  if (const auto reading = AskAlarms(request, alarms, kNow)) {
+    const bool all = request.args.value("all", false);
+    if (!all) FOCALFLEET_CHECK((*reading)(nullptr));  // nothing of it is in the store
+  } else {
+    explained(reading);
+  }
+  const auto chosen = SelectUnits(request.args, view);
+  explained(chosen);
+  if (chosen) FOCALFLEET_CHECK(!chosen->empty() && chosen->size() <= kUnitCount);
+  for (const char* verb : {"alarms_ack", "alarms_mute", "alarms_unmute"}) {
+    request.verb = verb;
+    const auto change = ChangeAlarms(request, &alarms, "uid 0", kNow);
+    FOCALFLEET_CHECK(change);
+    explained(*change);
+  }
+}
+
 void TryRequest(std::string_view line) {
   const auto request = DecodeRequest(line);
   if (!request) {
@@ -70,6 +102,7 @@ void TryRequest(std::string_view line) {
   FOCALFLEET_CHECK(again && again->id == request->id && again->verb == request->verb);
   FOCALFLEET_CHECK(again->args == request->args);
   static const SmallFleet fleet(kUnitCount);
+  TryQuestions(*request, fleet.View());
   const auto command = CommandOf(*request, fleet.View());
   if (command) {
     CheckUnits(*command);

@@ -1,8 +1,12 @@
 // Parameters written to units of the in-process fleet, positions among them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
+#include <variant>
+#include <vector>
 
+#include "protocol/wire/codec.h"
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/scenario/steps.h"
 
@@ -44,6 +48,80 @@ TEST(Configuration, ParameterIsSetWhenTheUnitSaysSo) {
   ASSERT_TRUE(silent.error);
   EXPECT_EQ(silent.error->code, ErrorCode::kUnavailable);
   EXPECT_EQ(silent.error->text, "unit 4 did not answer: it may have taken the value or not");
+}
+
+TEST(Configuration, ParameterIsTakenAfterTheQuestionThatIsOpen) {
+  InProcessFleet fleet(Small(44));
+  fleet.Run(Seconds(5));
+  // The poll of each unit at rest comes within these seconds; every step sends a parameter, so that
+  // some of them meet the question.
+  std::vector<OutFrame> sent;
+  fleet.sent = &sent;
+  const auto polled = [&] {
+    return std::ranges::any_of(sent, [&](const OutFrame& out) {
+      const auto frame = DecodeHost(out.frame);
+      return out.bus == fleet.layout().unit({3}).bus && frame &&
+             frame->address.node == fleet.layout().unit({3}).node &&
+             std::holds_alternative<StatusRequest>(frame->message);
+    });
+  };
+  ASSERT_TRUE(fleet.RunUntil(polled, Seconds(60)));
+  for (const Axis axis : kAxes)
+    fleet.Send({7000 + Index(axis), WriteParameterCommand{{3}, axis, Parameter::kRepeat, 54}});
+  fleet.Run(Seconds(1));
+  for (const Axis axis : kAxes) {
+    const auto reply = fleet.LastReply(7000 + Index(axis));
+    ASSERT_TRUE(reply);
+    EXPECT_FALSE(reply->error) << reply->error->text;
+    EXPECT_EQ(fleet.coordinator().drives()[3].axis[Index(axis)].repeat, 54);
+  }
+}
+
+TEST(Configuration, ParametersWaitUntilTheUnitIsReadAgain) {
+  InProcessFleet fleet(Small(45));
+  fleet.Run(Seconds(5));
+  // The unit is read anew after the first.
+  fleet.Send({7000, WriteParameterCommand{{3}, Axis::kTheta, Parameter::kSubdivision, 192}});
+  fleet.Send({7001, WriteParameterCommand{{3}, Axis::kPhi, Parameter::kSubdivision, 192}});
+  fleet.Send({7002, WriteParameterCommand{{3}, Axis::kPhi, Parameter::kRepeat, 54}});
+  fleet.Run(Seconds(2));
+  for (const std::uint64_t request : {7000u, 7001u, 7002u}) {
+    const auto reply = fleet.LastReply(request);
+    ASSERT_TRUE(reply) << request;
+    EXPECT_FALSE(reply->error) << reply->error->text;
+  }
+  EXPECT_EQ(fleet.coordinator().drives()[3].axis[1].subdivision, 192);
+  EXPECT_EQ(fleet.coordinator().drives()[3].axis[1].repeat, 54);
+}
+
+TEST(Configuration, ParametersThatWaitForASilentUnitAreRefused) {
+  InProcessFleet fleet(Small(46));
+  fleet.Run(Seconds(5));
+  fleet.world().disturb().faults(fleet.id(3))->silent = true;
+  for (std::uint64_t request = 7000; request < 7070; ++request)
+    fleet.Send({request, WriteParameterCommand{{3}, Axis::kTheta, Parameter::kRepeat, 54}});
+  fleet.Run(Seconds(10));
+  const auto error = [&](std::uint64_t request) {
+    const auto reply = fleet.LastReply(request);
+    return reply && reply->error ? reply->error->text : "none";
+  };
+  EXPECT_EQ(error(7000), "unit 4 did not answer: it may have taken the value or not");
+  EXPECT_EQ(error(7001), "unit 4 takes parameters only at rest; its phase is silent");
+  EXPECT_EQ(error(7069), "unit 4 has 64 parameters to write already; go on when they are answered");
+}
+
+TEST(Configuration, PlansWaitForAParameterThatIsBeingWritten) {
+  InProcessFleet fleet(Small(47));
+  fleet.Run(Seconds(5));
+  fleet.Send({7000, WriteParameterCommand{{3}, Axis::kTheta, Parameter::kRepeat, 54}});
+  fleet.Send({7001, WriteParameterCommand{{3}, Axis::kPhi, Parameter::kRepeat, 54}});
+  fleet.ApplyRandom(47);
+  const auto planned = [&] { return fleet.coordinator().configuration().round == 1; };
+  ASSERT_TRUE(fleet.RunUntil(planned, Seconds(10)));
+  for (const Axis axis : kAxes)
+    EXPECT_EQ(fleet.coordinator().drives()[3].axis[Index(axis)].repeat, 54);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
 }
 
 TEST(Configuration, WritingItsPositionMakesAUnitKnown) {

@@ -4,6 +4,7 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <stdexcept>
 
@@ -68,6 +69,12 @@ bool FakeDaemon::AnswerLine(const IncomingLine& line) {
   }
   for (const Json& progress : answer.progress) {
     server_->Progress(line.client, EncodeProgress(request->id, progress));
+  }
+  const auto unit = request->args.find("unit_id");
+  if (unit != request->args.end() &&
+      std::ranges::count(answer.refused_units, unit->get<std::uint32_t>()) > 0) {
+    server_->Answer(line.client, EncodeError(request->id, {ErrorCode::kRefused, "not now"}));
+    return true;
   }
   if (answer.hang_up || answer.answers_most == 0) return false;
   if (answer.answers_most > 0) --answer.answers_most;

@@ -22,6 +22,7 @@ struct FakeAnswer {
   Result<Json> result = Json::object();
   bool hang_up = false;   // closes everything instead of answering
   int answers_most = -1;  // after so many answers it hangs up; below 0: never
+  std::vector<std::uint32_t> refused_units = {};  // with "not now"
 };
 
 class FakeDaemon {

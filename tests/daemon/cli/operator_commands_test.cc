@@ -107,14 +107,21 @@ TEST_F(DaemonCommands, EventsAskForAPeriodUnitsAndASeverity) {
   EXPECT_EQ(Ask({"events", "-f", "--until", "1h"}, {}).exit, 2);
 }
 
-TEST_F(DaemonCommands, FollowedEventsBeginAfterTheLastOneShown) {
+TEST_F(DaemonCommands, FollowedEventsGoOnAfterTheNumbersOfTheLastPage) {
+  const Json next{{"alarm", 7}, {"unit", 1}, {"begun", 2}, {"ended", 2}};
   const Json event{{"at_ns", 41}, {"severity", "info"}, {"text", "once"}};
-  const auto text =
-      Ask({"events", "-f"}, {{"events", {.result = Json{{"events", {event}}}, .answers_most = 2}}});
+  // With `more` the next page is asked for at once.
+  const Json answer{{"events", {event}}, {"next", next}, {"more", true}};
+  const auto text = Ask({"events", "-f", "--since", "1h", "--severity", "info"},
+                        {{"events", {.result = answer, .answers_most = 3}}});
   EXPECT_EQ(text.exit, 4) << "the daemon is gone";
-  ASSERT_GE(requests_.size(), 2u);
-  EXPECT_FALSE(requests_[0].args.contains("since_ns"));
-  EXPECT_EQ(requests_[1].args["since_ns"], 42);
+  ASSERT_GE(requests_.size(), 3u);
+  EXPECT_FALSE(requests_[0].args.contains("after"));
+  for (const std::size_t page : {1u, 2u})
+    EXPECT_EQ(requests_[page].args, (Json{{"after", next}, {"severity", "info"}}));
+  const auto older = Ask({"events", "-f"}, {{"events", {.result = Json{{"events", {event}}}}}});
+  EXPECT_EQ(older.exit, 1);
+  EXPECT_THAT(older.err, HasSubstr("of another version"));
 }
 
 TEST_F(DaemonCommands, WaitEndsAsTheConfigurationDid) {
@@ -192,9 +199,11 @@ TEST_F(DaemonCommands, WhatCannotBeTakenBackIsRefusedWithoutATerminal) {
        std::vector<std::vector<std::string>>{{"home", "7", "--unproven"},
                                              {"adopt", "7"},
                                              {"disable", "1-11", "--reason", "x"},
+                                             {"params", "1-11", "set", "theta", "repeat", "54"},
                                              {"model", "load", model}}) {
-    const std::map<std::string, test::FakeAnswer> answers = {
-        {"home", {}}, {"adopt", {}}, {"disable", {}}, {"model_load", {}}, {"model", {}}};
+    const std::map<std::string, test::FakeAnswer> answers = {{"home", {}},    {"adopt", {}},
+                                                             {"disable", {}}, {"params_set", {}},
+                                                             {"model", {}},   {"model_load", {}}};
     const auto refused = Ask(words, answers);
     EXPECT_EQ(refused.exit, 1) << words[0];
     EXPECT_THAT(refused.err, HasSubstr("add --yes")) << words[0];
@@ -203,6 +212,54 @@ TEST_F(DaemonCommands, WhatCannotBeTakenBackIsRefusedWithoutATerminal) {
     EXPECT_EQ(Ask(words, answers).exit, 0) << words[0];
   }
   EXPECT_EQ(Ask({"disable", "1-10", "--reason", "x"}, {{"disable", {}}}).exit, 0) << "a few";
+  EXPECT_EQ(Ask({"params", "1-10", "set", "theta", "repeat", "54"}, {{"params_set", {}}}).exit, 0);
+  EXPECT_EQ(Ask({"params", "1-11"}, {{"params", {}}}).exit, 0) << "nothing is set";
+}
+
+/// A daemon that refuses units 7 and 9 alone.
+test::FakeAnswer RefusesSome(const Json& otherwise) {
+  return {.result = otherwise, .refused_units = {7, 9}};
+}
+
+TEST_F(DaemonCommands, ARefusalOfOneUnitDoesNotKeepTheOthersOut) {
+  const Json done{{"text", "done"}, {"goes", true}};
+  const struct {
+    std::vector<std::string> words;
+    std::string verb;
+  } commands[] = {{{"adopt", "7-10", "--yes"}, "adopt"},
+                  {{"params", "7-10", "set", "theta", "repeat", "54"}, "params_set"},
+                  {{"params", "7-10"}, "params"},
+                  {{"unit", "7-10"}, "unit"},
+                  {{"history", "7-10"}, "history"},
+                  {{"retarget", "7-10", "35", "120", "--angles"}, "retarget"}};
+  for (const auto& [words, verb] : commands) {
+    const auto some = Ask(words, {{verb, RefusesSome(done)}});
+    EXPECT_EQ(some.exit, 3) << verb;
+    ASSERT_EQ(requests_.size(), 4u) << verb;
+    EXPECT_EQ(requests_[3].args["unit_id"], 10) << verb;
+    EXPECT_THAT(some.err, HasSubstr("unit 7: not now")) << verb;
+    EXPECT_THAT(some.err, HasSubstr("unit 9: not now")) << verb;
+    EXPECT_THAT(some.err, HasSubstr("2 of 4 units refused")) << verb;
+    auto with_json = words;
+    with_json.emplace_back("--json");
+    const Json answer =
+        Json::parse(Ask(with_json, {{verb, RefusesSome(done)}}).out, nullptr, false);
+    EXPECT_EQ(answer["units"].size(), 2u) << verb;
+    EXPECT_EQ(answer["units"][1]["unit_id"], 10) << verb;
+    EXPECT_EQ(answer["refused"][1],
+              (Json{{"unit_id", 9}, {"code", "refused"}, {"text", "not now"}}))
+        << verb;
+  }
+  const auto none = Ask({"adopt", "7,9", "--yes"}, {{"adopt", RefusesSome(done)}});
+  EXPECT_EQ(none.exit, 1) << "nothing changed";
+  EXPECT_EQ(requests_.size(), 2u);
+  const auto one = Ask({"adopt", "7", "--yes"}, {{"adopt", RefusesSome(done)}});
+  EXPECT_EQ(one.exit, 1);
+  EXPECT_THAT(one.err, HasSubstr("error: not now"));
+  const auto gone = Ask({"adopt", "7-10", "--yes"}, {{"adopt", {.hang_up = true}}});
+  EXPECT_EQ(gone.exit, 5) << "whether unit 7 was adopted is not known";
+  EXPECT_EQ(requests_.size(), 1u) << "the others are not tried without a daemon";
+  EXPECT_EQ(Ask({"retarget", "7-10", "1", "2"}, {}).exit, 2) << "a place belongs to one unit";
 }
 
 }  // namespace

@@ -64,6 +64,19 @@ TEST(ReadFacts, ReadsWhatTheConfigurationNames) {
   EXPECT_EQ(facts.dds->participants, 120u);
 }
 
+TEST(ReadFacts, TheDaemonIsNotRootWhereNobodySaysSo) {
+  Facts facts;
+  facts.operator_user.uid = 4711;
+  // The folder of the store does not exist before the first start.
+  facts.store_folder = {.path = "/nowhere", .trouble = "No such file or directory"};
+  EXPECT_EQ(IdentityOfDaemon(facts, "nobody").name, "nobody") << "of the installed service";
+  EXPECT_EQ(IdentityOfDaemon(facts, "no such user").uid, 4711u);
+  facts.store_folder = {};
+  EXPECT_EQ(IdentityOfDaemon(facts, "no such user").uid, 4711u) << "no configuration";
+  facts.store_folder = {.path = "/", .trouble = "", .uid = 0};
+  EXPECT_EQ(IdentityOfDaemon(facts, "nobody").uid, 0u) << "root's folder";
+}
+
 TEST(ReadFacts, GoesOnWithoutAConfiguration) {
   const Facts facts = ReadFacts({.program_version = "9",
                                  .config_path = "/nowhere/f.toml",

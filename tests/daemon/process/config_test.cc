@@ -237,6 +237,7 @@ TEST(Config, WaitsForOurOwnProcessesStayInRealTimeWhereTheFleetIsFaster) {
   ASSERT_TRUE(config) << config.error().text;
   EXPECT_EQ(config->timing.reply_wait, CoordinatorConfig{}.reply_wait * 10);
   EXPECT_EQ(config->timing.start_delay, CoordinatorConfig{}.start_delay * 10);
+  EXPECT_EQ(config->timing.confirm_within, CoordinatorConfig{}.confirm_within * 10);
   EXPECT_EQ(config->timing.poll_period, CoordinatorConfig{}.poll_period);
   EXPECT_EQ(ParseConfig(fast + "[timing]\nreply_wait_ms = 60", "f.toml")->timing.reply_wait,
             Milliseconds(60))

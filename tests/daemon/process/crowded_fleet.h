@@ -5,10 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <fstream>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "daemon/control/line_client.h"
@@ -56,18 +54,10 @@ class CrowdedFleet {
     ASSERT_TRUE(client);
     for (std::uint32_t n = 0; n < kUnits; ++n)
       for (const Axis axis : kAxes) {
-        const auto set = [&] {
-          return client->Call("params_set", {{"unit_id", layout_.unit({n}).id.value},
-                                             {"axis", Name(axis)},
-                                             {"parameter", Name(Parameter::kPosition)},
-                                             {"value", poses[n][Index(axis)]}});
-        };
-        auto done = set();
-        // A unit that is just being asked something takes no parameter.
-        for (int again = 0; !done && again < 200; ++again) {
-          std::this_thread::sleep_for(std::chrono::milliseconds(20));
-          done = set();
-        }
+        const auto done = client->Call("params_set", {{"unit_id", layout_.unit({n}).id.value},
+                                                      {"axis", Name(axis)},
+                                                      {"parameter", Name(Parameter::kPosition)},
+                                                      {"value", poses[n][Index(axis)]}});
         ASSERT_TRUE(done) << done.error().text;
       }
   }

@@ -88,14 +88,42 @@ TEST_F(OperatorRequests, AConditionThatANewDaemonDoesNotFindIsOver) {
   EXPECT_FALSE(Listed("BusDown", true)["ended"].is_null());
 }
 
+TEST_F(OperatorRequests, AFollowerOfEventsMissesNone) {
+  Configure("[bus]\nport = \"simulated\"\n[clock]\nspeed = 20\n");
+  auto daemon = Start();
+  ASSERT_TRUE(Ready()) << Log();
+  const auto first = Ask("events");
+  ASSERT_TRUE(first);
+  constexpr int kChanges = 150;  // more than an answer has without `after`
+  for (int n = 0; n < kChanges; ++n)
+    ASSERT_TRUE(
+        Ask("disable", {{"unit_ids", {2}}, {"reason", "reason " + std::to_string(n) + " of it"}}));
+  // Each was answered when it was durable.
+  const auto page = Ask("events", {{"after", (*first)["next"]}, {"unit_ids", {2}}});
+  ASSERT_TRUE(page) << page.error().text;
+  ASSERT_EQ((*page)["events"].size(), static_cast<std::size_t>(kChanges));
+  for (int n = 0; n < kChanges; ++n)
+    EXPECT_THAT((*page)["events"][static_cast<std::size_t>(n)]["text"].get<std::string>(),
+                HasSubstr("disabled: reason " + std::to_string(n) + " of it"));
+  EXPECT_EQ((*Ask("events"))["events"].size(), 100u);
+}
+
 TEST_F(OperatorRequests, ADryRunMovesAndStoresNothing) {
   Configure("[bus]\nport = \"simulated\"\n[clock]\nspeed = 20\n");
   auto daemon = Start();
   ASSERT_TRUE(Ready()) << Log();
   const Json targets = {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,90,150\n2,20,150\n"}};
   ASSERT_TRUE(Ask("disable", {{"unit_ids", {2}}, {"reason", "bent"}}));
+  const auto places = [&] { return (*Ask("state"))["rows"]; };
+  const auto happened = [&] { return (*Ask("events"))["events"]; };
+  ASSERT_TRUE(
+      WaitUntil([&] { return happened().dump().find("bent") != std::string::npos; }, kPatienceMs));
+  const Json places_before = places();
+  const Json happened_before = happened();
   const auto preview = Ask("preview", targets);
   ASSERT_TRUE(preview) << preview.error().text;
+  EXPECT_EQ(places(), places_before);
+  EXPECT_EQ(happened(), happened_before);
   EXPECT_EQ((*preview)["targeted"], 2);
   EXPECT_EQ((*preview)["served"], 1);
   EXPECT_GT((*preview)["makespan_s"], 0);

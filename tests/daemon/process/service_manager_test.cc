@@ -76,13 +76,24 @@ TEST_F(ServiceManagerTest, FeedsTheWatchdogWhileAllThreadsSleep) {
 }
 
 TEST_F(ServiceManagerTest, FeedsNothingWithoutAnInterval) {
+  Configure("[bus]\nport = \"simulated\"\n[clock]\nspeed = 5\n");
+  // A feed would come four times a second, and the configuration lasts for seconds.
   auto daemon = StartWith({"WATCHDOG_USEC=1000000", "WATCHDOG_PID=1"});
   ASSERT_TRUE(Ready()) << Log();
-  daemon.Signal(SIGTERM);
-  for (auto message = manager_.Next(); message; message = manager_.Next()) {
+  ASSERT_TRUE(Ask("apply", {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,40,90\n"}}));
+  bool moved = false;
+  bool ended = false;
+  while (!ended) {
+    const auto message = manager_.Next();
+    ASSERT_TRUE(message) << Log();
     EXPECT_EQ(message->find("WATCHDOG"), std::string::npos) << *message;
-    if (message->find("STOPPING") != std::string::npos) break;
+    moved |= message->find("configuration 1 is moving") != std::string::npos;
+    const bool rests = message->find("2 of 2 units ready") != std::string::npos &&
+                       message->find("; configuration") == std::string::npos;
+    if (moved && rests) daemon.Signal(SIGTERM);
+    ended = message->find("STOPPING") != std::string::npos;
   }
+  EXPECT_TRUE(moved && ended) << Log();
 }
 
 // A debugger stops a single thread; to the others it looks as if it hung in the kernel.

@@ -74,5 +74,30 @@ TEST(UnixDoors, AFrameEntersTheWorldNoSoonerThanItWasSent) {
   }
 }
 
+TEST(UnixDoors, ADeadBusIsDownUntilItIsRevived) {
+  const ScratchFolder scratch;
+  const HostClock clock;
+  sim::World world(OneUnit());
+  const auto doors = UnixDoors::Create({scratch.path(), {BusId{3}}}).value();
+  const auto port = UnixPort::Create({.bus = BusId{3}, .path = scratch / "bus3.sock"}).value();
+  HostInstant now = clock.Now();
+  const auto turn = [&] {
+    std::vector<ReceivedFrame> heard;
+    doors->Exchange(clock, &world);
+    now = now + Seconds(1);  // the port tries to connect again
+    port->Receive(now, &heard);
+    return port->state();
+  };
+  EXPECT_EQ(turn(), LinkState::kUp);
+  EXPECT_EQ(doors->wake_at(), kNever);
+  world.disturb().KillBus(BusId{3});
+  for (int again = 0; again < 3; ++again) EXPECT_EQ(turn(), LinkState::kDown);
+  EXPECT_NE(port->trouble(), "");
+  EXPECT_NE(doors->wake_at(), kNever) << "nothing else tells the doors that the bus is back";
+  world.disturb().ReviveBus(BusId{3});
+  EXPECT_EQ(turn(), LinkState::kUp);
+  EXPECT_EQ(doors->wake_at(), kNever);
+}
+
 }  // namespace
 }  // namespace focalfleet::simulator

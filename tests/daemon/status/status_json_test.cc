@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "tests/daemon/verbs/small_fleet.h"
 
 namespace focalfleet {
@@ -42,6 +44,20 @@ TEST(StatusJson, StatusTellsAlarmsAndTheNextStep) {
   facts.store_failing = true;
   EXPECT_EQ(StatusJson(fleet.View(), facts)["next"],
             "focalfleet alarms  (the store cannot be written)");
+}
+
+TEST(StatusJson, TheNextStepChoosesManyUnitsByStatesThatTheyAreIn) {
+  constexpr std::uint32_t kUnits = 40;
+  SmallFleet fleet(kUnits);
+  EnableCommand gaps{.units = {}, .enabled = false, .reason = "not to be named"};
+  for (std::uint32_t n = 0; n < kUnits; n += 2) gaps.units.push_back({n});
+  const std::vector<Command> commands = {{.request = 1, .what = gaps}};
+  fleet.Step({.now = {}, .commands = commands});
+  ShellFacts facts;
+  facts.buses.resize(1);
+  EXPECT_EQ(StatusJson(fleet.View(), facts)["next"],
+            "focalfleet unit --state silent --state absent  (20 units are not heard)")
+      << "none of them was ever heard, so none is silent";
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <atomic>
 #include <memory>
 #include <string>
 #include <variant>
@@ -201,7 +203,7 @@ TEST_F(RequestHandlerTest, AnAcknowledgementIsKeptWithItsUser) {
   EXPECT_THAT(clients_[0]->Receive(), HasSubstr("alarm 5 is not open"));
   ASSERT_EQ(commands_.size(), 1u);
   const auto& keep = std::get<KeepRowsCommand>(commands_[0].what);
-  EXPECT_EQ(keep.text, "acknowledged 1");
+  EXPECT_EQ(keep.text, "1 alarm is acknowledged");
   EXPECT_EQ(std::get<OpenAlarmRow>(keep.rows.at(0)).acknowledged_by,
             "uid " + std::to_string(::getuid()));
   const Effects effects = fleet_.Step({.now = {}, .commands = commands_});
@@ -261,6 +263,77 @@ TEST_F(RequestHandlerTest, ADryRunIsPlannedAndChangesNothing) {
   handler_.PreviewDone(fleet_.View(), {.purpose = PlanPurpose::kPreview,
                                        .plan = Fail(ErrorCode::kUnavailable, "given up")});
   EXPECT_THAT(clients_[0]->Receive(), HasSubstr("is planned first"));
+}
+
+TEST_F(RequestHandlerTest, ADryRunShowsThatItIsPlanned) {
+  EXPECT_EQ(handler_.wake_at(), kNever);
+  Add(Line(7, "preview", {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,10,90\n"}}));
+  TurnUntilQuiet();
+  auto job = handler_.TakePreview();
+  ASSERT_TRUE(job);
+  EXPECT_NE(handler_.wake_at(), kNever);
+  handler_.ShowProgress(fleet_.View(HostInstant{Seconds(130).ns}));
+  TurnUntilQuiet();
+  const std::string progress = clients_[0]->Receive();
+  EXPECT_THAT(progress, HasSubstr(R"("progress":{)"));
+  EXPECT_THAT(progress, HasSubstr(R"("elapsed_s":130.0)"));
+  handler_.RefusePreview();
+  EXPECT_EQ(handler_.wake_at(), kNever) << "it is over";
+}
+
+TEST_F(RequestHandlerTest, ARetargetThatWaitsShowsThatTheDaemonLives) {
+  Add(Line(8, "retarget", {{"unit_id", 1}, {"theta_deg", 10}, {"phi_deg", 90}}));
+  TurnUntilQuiet();
+  ASSERT_EQ(commands_.size(), 1u);
+  handler_.ShowProgress(fleet_.View(HostInstant{Seconds(130).ns}));
+  TurnUntilQuiet();
+  EXPECT_THAT(clients_[0]->Receive(), HasSubstr(R"({"id":8,"progress":{)"));
+  handler_.Reply(fleet_.View(), {commands_[0].request, true, {}, "unit 1 goes"});
+  EXPECT_EQ(handler_.wake_at(), kNever);
+}
+
+TEST_F(RequestHandlerTest, QuestionsToTheStoreAreAnsweredByAnotherThread) {
+  std::vector<std::string> verbs = {"history", "events", "params", "measurements", "alarms"};
+  RawClient& client = Add();
+  for (std::size_t n = 0; n < verbs.size(); ++n)
+    client.Send(Line(n + 1, verbs[n], {{"all", true}, {"unit_id", 1}}));
+  TurnUntilQuiet();
+  std::vector<StoreQuestion> handed_over;
+  const auto submit = [&](StoreQuestion* question) {
+    if (handed_over.size() == 3) return false;  // no room
+    handed_over.push_back(std::move(*question));
+    return true;
+  };
+  handler_.SubmitQuestions(submit);
+  EXPECT_EQ(handed_over.size(), 3u);
+  std::vector<StoreQuestion> rest;
+  handler_.SubmitQuestions([&](StoreQuestion* question) {
+    rest.push_back(std::move(*question));
+    return true;
+  });
+  ASSERT_EQ(rest.size(), 2u);
+  const std::atomic<bool> ending{false};
+  StoreQuestions store(scratch_ / "none.db");
+  for (const StoreQuestion& question : handed_over) handler_.Answered(store(question, ending));
+  TurnUntilQuiet();
+  const std::string answers = client.Receive();
+  EXPECT_EQ(std::ranges::count(answers, '\n'), 3) << answers;
+  EXPECT_THAT(answers, HasSubstr("none.db: No such file"));
+  handler_.Close();
+  EXPECT_THAT(client.Receive(), HasSubstr("the daemon ends"));
+}
+
+TEST_F(RequestHandlerTest, OpenAlarmsNeedNoStore) {
+  Add(Line(1, "alarms"));
+  TurnUntilQuiet();
+  EXPECT_THAT(clients_[0]->Receive(), HasSubstr(R"("alarms":[])"));
+}
+
+TEST_F(RequestHandlerTest, QuestionsThatWaitForTheStoreAreBounded) {
+  RawClient& client = Add();
+  for (std::uint64_t n = 0; n <= limits::kControlClients; ++n) client.Send(Line(n + 1, "history"));
+  TurnUntilQuiet();
+  EXPECT_THAT(client.Receive(), HasSubstr("64 questions wait for the store"));
 }
 
 TEST(RequestHandler, KnowsAStopFromEverythingElse) {
