@@ -61,9 +61,13 @@ class Store {
   /// Cost: one prepared statement a row (two for a VectorRow), no allocation, one fsync.
   Status Commit(std::span<const Row> rows, WallTime now, std::size_t* refused = nullptr);
 
-  /// Ended moves, configurations, measurements and alarms before `before` are gone, at most
-  /// `rows_max` of each table, so that the transaction stays short. Rows that the coordinator loads
-  /// are never pruned. The result is the number of rows that are gone.
+  /// The time of the newest row of the history; 0: there is none.
+  Result<WallTime> Newest();
+
+  /// Ended moves, configurations, measurements, alarms and histories before `before` are gone, at
+  /// most `rows_max` of each table, so that the transaction stays short. Rows that a start of the
+  /// daemon reads stay: what the coordinator loads, and what says for which units a model holds.
+  /// Texts of models stay. The result is the number of rows that are gone.
   Result<std::uint64_t> Prune(WallTime before, std::uint32_t rows_max);
 
   [[nodiscard]] const StoreCounters& counters() const { return counters_; }
