@@ -297,6 +297,24 @@ TEST_F(StoreTest, PruneKeepsWhatSaysForWhichUnitsAModelHolds) {
   EXPECT_EQ(store->Prune(kNine, 100), 0u);
 }
 
+TEST(OldBefore, AStepOfTheWallClockMakesNothingOld) {
+  constexpr std::int64_t kDayNs = 86'400'000'000'000;
+  const HistoryAge age{
+      .now = kEight, .newest = {kEight.ns - kDayNs}, .open_s = 86'400, .keep_days = 30};
+  EXPECT_EQ(OldBefore(age).ns, kEight.ns - 30 * kDayNs);
+  HistoryAge stepped = age;
+  stepped.now = {kEight.ns + 36'500 * kDayNs};
+  EXPECT_EQ(OldBefore(stepped).ns, kEight.ns - 30 * kDayNs) << "a century ahead";
+  stepped.now = {kEight.ns - 100 * kDayNs};
+  EXPECT_EQ(OldBefore(stepped).ns, kEight.ns - 130 * kDayNs) << "back: less is old";
+  HistoryAge kept = age;
+  kept.keep_days = 0;
+  EXPECT_EQ(OldBefore(kept).ns, 0);
+  kept = age;
+  kept.newest = {0};
+  EXPECT_EQ(OldBefore(kept).ns, 0) << "there is no history";
+}
+
 TEST_F(StoreTest, TheNewestTimeIsThatOfTheHistory) {
   auto store = OpenStore();
   EXPECT_EQ(store->Newest()->ns, 0);
