@@ -76,6 +76,12 @@ class ModelReader {
     return values;
   }
 
+  Result<std::uint32_t> UnitNumber(const toml::node& node, double id) const {
+    if (!(id >= 0 && id <= UINT32_MAX) || id != std::floor(id))
+      return Wrong(node, "a unit's number is not whole or too large");
+    return static_cast<std::uint32_t>(id);
+  }
+
   static std::vector<std::string> Words(const toml::table& table, std::string_view key) {
     std::vector<std::string> words;
     if (const toml::array* array = table[key].as_array())
@@ -85,7 +91,8 @@ class ModelReader {
 
   Status ReadUnit(const toml::table& table) {
     FOCALFLEET_TRY_ASSIGN(const double id, Number(table, "unit_id"));
-    const auto at = index_.find(static_cast<std::uint32_t>(id));
+    FOCALFLEET_TRY_ASSIGN(const std::uint32_t unit_id, UnitNumber(table, id));
+    const auto at = index_.find(unit_id);
     if (at == index_.end()) return {};
     sim::CampaignUnit& unit = model_.units[at->second];
     const sim::CampaignUnit described = unit;
@@ -236,7 +243,8 @@ class ModelReader {
                               std::to_string(ids.size()) + " units");
     for (std::size_t k = 0; k < ids.size(); ++k) {
       if (!std::isfinite(shapes[k])) return Wrong(table, "shapes: one is no number");
-      form->shape_of_unit[static_cast<std::uint32_t>(ids[k])] = shapes[k];
+      FOCALFLEET_TRY_ASSIGN(const std::uint32_t unit_id, UnitNumber(table, ids[k]));
+      form->shape_of_unit[unit_id] = shapes[k];
     }
     return {};
   }
@@ -262,7 +270,8 @@ class ModelReader {
     term.group_of_unit.assign(model_.units.size(), sim::kNoGroup);
     GroupNumbers groups;
     for (std::size_t k = 0; k < ids.size(); ++k) {
-      const auto at = index_.find(static_cast<std::uint32_t>(ids[k]));
+      FOCALFLEET_TRY_ASSIGN(const std::uint32_t unit_id, UnitNumber(table, ids[k]));
+      const auto at = index_.find(unit_id);
       if (at == index_.end()) continue;
       const std::span<const double> own = std::span(amplitude).subspan(k * c, c);
       for (const double one : own)

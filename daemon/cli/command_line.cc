@@ -44,7 +44,7 @@ const std::vector<Group>& Groups() {
   };
   return groups;
 }
-constexpr const char* kTools = "Tools";  // can, completion, help
+constexpr const char* kTools = "Tools";  // can, completion, help, store
 
 /// Puts each command into its group. Help lists groups in the order of their first command.
 void AssignGroups(CLI::App* app) {
@@ -83,9 +83,9 @@ void AddGlobalOptions(CommandLine* line) {
 }
 
 // Commands that never ask a daemon. They end with kRefused where their answer cannot be written.
-constexpr std::array<std::string_view, 12> kOffline = {
-    "can",    "completion", "diagnose",  "estimate", "hall",    "help",
-    "layout", "plan",       "reproduce", "simulate", "targets", "tune"};
+constexpr std::array<std::string_view, 13> kOffline = {
+    "can",  "completion", "diagnose", "estimate", "hall",    "help", "layout",
+    "plan", "reproduce",  "simulate", "store",    "targets", "tune"};
 
 // Fills standard streams that the caller closed. Otherwise an opened file would get the number of a
 // closed stream, and messages would end in it. The file /dev/null, opened in the wrong direction,
@@ -208,6 +208,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddMeasurementsCommand(line.get());
   AddCampaignCommands(line.get());
   AddModelCommands(line.get());
+  AddStoreCommands(line.get());
   AddCanCommands(line.get());
   AddDoctorCommand(line.get());
   AddCompletionCommand(line.get());

@@ -78,6 +78,7 @@ void AddCanCommands(CommandLine* line);
 void AddHallCommands(CommandLine* line);
 void AddMeasurementsCommand(CommandLine* line);
 void AddModelCommands(CommandLine* line);
+void AddStoreCommands(CommandLine* line);
 void AddDoctorCommand(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 void AddHelpCommand(CommandLine* line);

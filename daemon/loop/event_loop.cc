@@ -17,6 +17,7 @@
 
 #include "daemon/loop/event_log.h"
 #include "daemon/verbs/model_upkeep.h"
+#include "fleet/plan/job.h"
 
 namespace focalfleet {
 namespace {
@@ -172,8 +173,8 @@ void EventLoop::Gather() {
   frames_.clear();
   links_.clear();
   commands_.clear();
-  plans_.clear();
-  exposures_.clear();
+  plans_ = std::exchange(not_done_plans_, {});
+  exposures_ = std::exchange(not_done_exposures_, {});
   parts_.lines->Receive(now_, &frames_, &links_);
   while (auto plan = parts_.planner->Take()) {
     if (plan->purpose == PlanPurpose::kPreview)
@@ -236,7 +237,11 @@ void EventLoop::Perform() {
   if (effects_.exposure && parts_.camera != nullptr) {
     const auto drives = parts_.coordinator->drives();
     CameraWork work{std::move(*effects_.exposure), {drives.begin(), drives.end()}};
-    if (!parts_.camera->Submit(&work)) spdlog::error("exposure {} found no room", work.job.id);
+    if (!parts_.camera->Submit(&work)) {
+      not_done_exposures_.push_back(
+          {work.job.id, Fail(ErrorCode::kUnavailable, "the camera's thread has no room")});
+      parts_.threads->Raise();
+    }
   }
   for (const ReplyEffect& reply : effects_.replies) parts_.handler->Reply(View(), reply);
   if (parts_.scheduler != nullptr) parts_.scheduler->Changed(effects_.changed);
@@ -251,8 +256,10 @@ void EventLoop::SubmitPlan(PlanJob job) {
   PlannerWork work{
       std::move(job), {drives.begin(), drives.end()}, preview ? preview_given_up_ : nullptr};
   if (parts_.planner->Submit(&work)) return;
-  spdlog::error("plan job {} found no room", work.job.job);
-  if (preview) parts_.handler->RefusePreview();
+  if (preview) return parts_.handler->RefusePreview();
+  not_done_plans_.push_back(
+      PlanFailed(work.job, {ErrorCode::kUnavailable, "the planner's thread has no room"}));
+  parts_.threads->Raise();
 }
 
 void EventLoop::PublishStatus() {

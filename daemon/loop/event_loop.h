@@ -110,6 +110,9 @@ class EventLoop {
   std::vector<Command> commands_;
   std::vector<PlanDone> plans_;
   std::vector<ExposureDone> exposures_;
+  // Answers for jobs that found no room.
+  std::vector<PlanDone> not_done_plans_;
+  std::vector<ExposureDone> not_done_exposures_;
   std::vector<ShellNote> notes_;
   std::shared_ptr<std::atomic<bool>> preview_given_up_;
   /// The facts of the store's thread, as the coordinator last received them.

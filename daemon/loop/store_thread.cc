@@ -13,7 +13,12 @@ namespace {
 constexpr std::size_t kBatches = 1024;
 constexpr std::size_t kStatuses = 4;
 constexpr std::size_t kRowsPerTransaction = 65'536;
-constexpr std::chrono::milliseconds kPublishAgain{50};
+/// At the end the publisher may be behind, and nothing else wakes the thread. The wait is a tenth
+/// of what a slow cycle of DDS takes.
+constexpr std::chrono::milliseconds kOfferAgain{20};
+/// In half a second even a slow cycle is over. Twice as many would take the time in which the
+/// daemon must have ended.
+constexpr int kOffersAtEnd = 25;
 /// Alarms of the thread itself are numbered apart from the stored ones: the store fails, so these
 /// alarms are not stored.
 constexpr std::uint64_t kOwnAlarms = std::uint64_t{1} << 63;
@@ -96,12 +101,13 @@ void StoreThread::Run() {
     if (committed && batches_.size() > 0) continue;
     // At the end a broken disk gets one more attempt only.
     if (ending && (Idle() || failing_)) return;
+    if (committed && !ending && KeepUp()) continue;
     if (attempted_)
       wake_.Wait(std::clamp(std::chrono::ceil<std::chrono::milliseconds>(
                                 retry_at_ - std::chrono::steady_clock::now()),
                             std::chrono::milliseconds(1), sinks_.retry_period));
     else
-      wake_.Wait(publish_again_ || status_ ? std::optional(kPublishAgain) : std::nullopt);
+      wake_.Wait(ending ? std::optional(kOfferAgain) : std::nullopt);
   }
 }
 
@@ -188,8 +194,16 @@ void StoreThread::NoteFailure(const Error& error) {
   progressed_->Raise();
 }
 
+/// True: more is due at once.
+bool StoreThread::KeepUp() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < upkeep_at_) return false;
+  const bool more = sinks_.upkeep();
+  upkeep_at_ = more ? now : now + sinks_.upkeep_period;
+  return more;
+}
+
 void StoreThread::PublishReady() {
-  if (publish_again_) publish_again_ = sinks_.publish({});
   for (;;) {
     if (!status_) status_ = statuses_.Pop();
     if (!status_) return;
@@ -200,11 +214,13 @@ void StoreThread::PublishReady() {
         ahead.fleet = std::move(status_->fleet);
         ahead.fleet->store_failing = true;
         status_->fleet.reset();
-        publish_again_ = sinks_.publish(ahead) || publish_again_;
+        static_cast<void>(sinks_.publish(&ahead));  // the next one says the same
       }
       return;
     }
-    publish_again_ = sinks_.publish(*status_) || publish_again_;
+    if (!sinks_.publish(&*status_)) {
+      if (!ending_ || ++offered_at_end_ < kOffersAtEnd) return;  // else DDS hangs
+    }
     status_.reset();
   }
 }

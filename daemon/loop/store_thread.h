@@ -37,14 +37,19 @@ class StoreThread {
     /// As Store::Commit. Where the error is kInvalid and concerns one row, `refused` is the index
     /// of this row; else it is the number of rows.
     std::function<Status(std::span<const Row>, WallTime, std::size_t* refused)> commit;
-    /// True: some status still waits to go out; the thread calls again soon, with nothing new.
-    std::function<bool(const StatusBatch&)> publish;
+    /// The status is taken over. False: the publisher is behind, and the status is untouched; it is
+    /// offered again after the next Wake.
+    std::function<bool(StatusBatch*)> publish;
     std::function<void(const AlarmValue&)> alarm;
     std::function<void(const std::string&)> log_error;
     std::function<void(const std::string&)> log_info;
     /// Called in each turn of the thread, and after each Wake.
     std::function<void()> alive = [] {};
+    /// A piece of upkeep that takes no longer than a commit does. True: more is due. Called where
+    /// no rows wait, once an upkeep_period or as long as more is due.
+    std::function<bool()> upkeep = [] { return false; };
     std::chrono::milliseconds retry_period{1000};
+    std::chrono::milliseconds upkeep_period{3'600'000};
   };
 
   /// The thread runs. `progressed` is raised when one of the three facts changed; it outlives the
@@ -93,6 +98,7 @@ class StoreThread {
   void SetAside(std::size_t row, const std::string& why);
   void NoteFailure(const Error& error);
   void PublishReady();
+  [[nodiscard]] bool KeepUp();
   [[nodiscard]] bool Idle() const;
 
   Sinks sinks_;
@@ -112,10 +118,11 @@ class StoreThread {
   // Members that the store's thread alone uses.
   Batch open_;                         // being committed; empty rows: none
   std::optional<StatusBatch> status_;  // waits for its rows
-  bool publish_again_ = false;
-  bool attempted_ = false;  // the open batch has failed
+  bool attempted_ = false;             // the open batch has failed
   std::chrono::steady_clock::time_point retry_at_;
+  std::chrono::steady_clock::time_point upkeep_at_;
   std::uint64_t own_alarms_ = 0;
+  int offered_at_end_ = 0;  // status, in vain
 
   std::thread thread_;
 };

@@ -1,6 +1,8 @@
 #include "daemon/ports/link_recovery.h"
 
 #include <algorithm>
+#include <string>
+#include <system_error>
 #include <utility>
 
 namespace focalfleet {
@@ -35,12 +37,19 @@ std::optional<Status> LinkRecovery::Poll(HostInstant now) {
     return outcome;
   }
   attempt_ = std::make_shared<Attempt>();
-  thread_ = std::thread([attempt = attempt_, revive = options_.revive] {
-    attempt->outcome = revive();
-    attempt->over.store(true, std::memory_order_release);
-  });
   wait_ = std::min(wait_ * 2, options_.longest_wait);
   wake_at_ = now + options_.poll_period;
+  try {
+    thread_ = options_.start([attempt = attempt_, revive = options_.revive] {
+      attempt->outcome = revive();
+      attempt->over.store(true, std::memory_order_release);
+    });
+  } catch (const std::system_error& error) {
+    // A host without a free thread is no reason to end: the bus stays off and is tried again.
+    attempt_ = nullptr;
+    wake_at_ = now + wait_;
+    return Fail(ErrorCode::kUnavailable, std::string("no thread to restart it: ") + error.what());
+  }
   return std::nullopt;
 }
 

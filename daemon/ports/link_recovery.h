@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "protocol/base/instants.h"
 #include "protocol/base/result.h"
@@ -24,6 +25,10 @@ class LinkRecovery {
     DurationNs first_wait = Milliseconds(1000);  // of real time, as all durations here
     DurationNs longest_wait = Milliseconds(60'000);
     DurationNs poll_period = Milliseconds(10);  // while an attempt is under way
+    /// Starts a thread, or throws as std::thread does.
+    std::function<std::thread(std::function<void()>)> start = [](std::function<void()> work) {
+      return std::thread(std::move(work));
+    };
   };
   explicit LinkRecovery(Options options) : options_(std::move(options)) {}
   LinkRecovery(const LinkRecovery&) = delete;

@@ -14,6 +14,7 @@ namespace focalfleet {
 /// Events of a port that no frame reports, counted since the start.
 struct PortCounters {
   std::uint64_t rejected = 0;     // not an extended data frame of 0..8 bytes
+  std::uint64_t forged = 0;       // as from a unit, and sent by another program of this host
   std::uint64_t lost = 0;         // the kernel's receive queue overflowed
   std::uint64_t link_errors = 0;  // error frames, failed reads and writes
   std::uint64_t reconnects = 0;   // times the link came up again

@@ -71,6 +71,7 @@ struct Packet {
   const canfd_frame* raw = nullptr;
   std::size_t size = 0;  // bytes; 0: more than any frame has
   bool own = false;      // the host's own frame, echoed
+  bool local = false;    // sent on this host
   Reported reported;
 };
 
@@ -114,6 +115,10 @@ void Sort(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFrame>* 
   counters->lost = std::max<std::uint64_t>(counters->lost, packet.reported.dropped);
   if (packet.own && aside != nullptr) {
     ++aside->confirmed;
+    return;
+  }
+  if (packet.local && aside != nullptr && aside->no_local) {
+    ++counters->forged;
     return;
   }
   if (packet.size == sizeof(canfd_frame) && aside != nullptr && aside->groups)
@@ -236,7 +241,8 @@ BatchReceived ReceiveFrames(int fd, const FrameSource& source, std::vector<Recei
   Stamp stamp{source.bus, source.clock.Now(), source.clock};
   for (std::size_t total = 0; total < kFramesPerReceive;) {
     Batch batch(kBatch, /*with_control=*/true);
-    const int got = ::recvmmsg(fd, batch.messages.data(), kBatch, MSG_DONTWAIT, nullptr);
+    const auto receive = aside != nullptr ? aside->receive : ::recvmmsg;
+    const int got = receive(fd, batch.messages.data(), kBatch, MSG_DONTWAIT, nullptr);
     if (got < 0) {
       if (errno == EINTR) continue;
       return {.closed = false, .error = errno == EAGAIN ? 0 : errno};
@@ -252,6 +258,7 @@ BatchReceived ReceiveFrames(int fd, const FrameSource& source, std::vector<Recei
       Sort({.raw = &batch.frames[i],
             .size = (flags & MSG_TRUNC) == 0 ? message.msg_len : 0,
             .own = (flags & MSG_CONFIRM) != 0,
+            .local = (flags & MSG_DONTROUTE) != 0,
             .reported = ReadControl(&message.msg_hdr)},
            stamp, out, counters, aside);
     }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <linux/can.h>
+#include <sys/socket.h>
 
 #include <optional>
 #include <span>
@@ -84,6 +85,9 @@ class FrameStamps {
   HostInstant now_;
 };
 
+/// As recvmmsg.
+using SystemReceive = int (*)(int, mmsghdr*, unsigned, int, timespec*);
+
 /// Aside is what a CAN_RAW socket delivers beside the frames of other nodes.
 struct Aside {
   std::vector<can_frame> errors;
@@ -91,6 +95,9 @@ struct Aside {
   std::optional<FrameStamps> stamps;  // set: the kernel stamps frames. To be kept
   bool only_units = false;            // drop frames of other hosts
   bool groups = false;                // CAN FD frames may arrive
+  bool no_local = false;  // drop and count frames that another program of this host sent
+  /// The system call, for tests: the kernel alone marks frames of this host.
+  SystemReceive receive = ::recvmmsg;
 };
 
 /// The source of frames and the clock for their stamps. The clock is read after a batch has been

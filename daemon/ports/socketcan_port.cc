@@ -15,6 +15,9 @@ constexpr DurationNs kLookPeriod = Milliseconds(1000);  // real time
 /// On a bus at its limit this time is 6000 frames.
 constexpr DurationNs kConfirmationLost = Milliseconds(1000);
 constexpr DurationNs kFull = Milliseconds(1);
+/// Lost and forged frames are a bus' trouble for so long after the last one: as long as equal
+/// alarms are folded. With less, each burst would be an alarm of its own; more shows what is over.
+constexpr DurationNs kMissedShown = Seconds(60);
 
 HostInstant Monotonic() { return {ReadMonotonicNs()}; }
 
@@ -78,6 +81,7 @@ SocketCanPort::SocketCanPort(Options options, WatchedSocket socket)
   aside_.only_units = options_.hears == Hears::kUnits;
   // A unit on such a bus takes staging frames either way.
   aside_.groups = !aside_.only_units || options_.data_bit_rate_bps > 0;
+  aside_.receive = options_.receive;
 }
 
 Result<std::unique_ptr<SocketCanPort>> SocketCanPort::Create(Options options) {
@@ -110,6 +114,8 @@ Status SocketCanPort::Open() {
     trouble_ = right.error().text;
     return right;
   }
+  // No unit speaks from this host. On a virtual interface the simulated fleet does.
+  aside_.no_local = aside_.only_units && link_.real();
   window_ = TransmitWindow(
       {.confirms = link_.echoes,
        .bit_rate_bps = link_.echoes ? 0 : link_.bit_rate_bps,
@@ -232,6 +238,7 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   const std::size_t before = out->size();
   const BatchReceived received =
       ReceiveFrames(socket_.socket(), {options_.bus, options_.clock}, out, &counters_, &aside_);
+  NoteMissed(now);
   window_.Confirmed(aside_.confirmed);
   if (aside_.confirmed > 0) waits_since_ = options_.wire_clock();
   // The window goes by bits only on a bus in real time, and there the host's clock is monotonic.
@@ -244,6 +251,22 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   if (received.error == 0) return;
   Lose(std::string("cannot receive: ") + std::strerror(received.error));
   retry_at_ = now + options_.clock.Real(options_.retry_period);
+}
+
+void SocketCanPort::NoteMissed(HostInstant now) {
+  const char* what = nullptr;
+  if (std::exchange(lost_noted_, counters_.lost) < counters_.lost)
+    what = "frames were lost: this host did not read them in time";
+  if (std::exchange(forged_noted_, counters_.forged) < counters_.forged)
+    what = "a program of this host sends frames as from units; they are not believed";
+  if (what != nullptr && (trouble_.empty() || trouble_ == missed_)) {
+    missed_ = trouble_ = what;
+    missed_until_ = now + options_.clock.Real(kMissedShown);
+  } else if (now >= missed_until_) {
+    if (trouble_ == missed_) trouble_.clear();
+    missed_.clear();
+    missed_until_ = kNever;
+  }
 }
 
 std::string SocketCanPort::WithCauses(const std::string& what) const {

@@ -42,6 +42,7 @@ class SocketCanPort : public PollablePort {
     std::function<HostInstant()> wire_clock = {};
     WallAhead (*wall_ahead)() = ReadWallAhead;
     InterfaceOpener open = OpenInterface;
+    SystemReceive receive = ::recvmmsg;
     LinkRecovery::Reviver revive = {};  // empty: ReviveLink
   };
   /// Tries to open the interface once. An interface that is down or missing is no error: the link
@@ -73,6 +74,8 @@ class SocketCanPort : public PollablePort {
   void SetState(LinkState state, HostInstant now);
   void LookAgain(HostInstant now);
   void Recover(HostInstant now);
+  /// Frames that were lost or forged are a trouble of a link that is up, for a while.
+  void NoteMissed(HostInstant now);
   /// Passes down the frames that fit into `room` frames, or one group. Pre: room is not 0.
   BatchSent HandDown(std::span<const CanFrame> frames, std::size_t room, HostInstant monotonic);
   [[nodiscard]] std::size_t Room(bool urgent, HostInstant monotonic);
@@ -93,6 +96,10 @@ class SocketCanPort : public PollablePort {
   HostInstant waits_since_ = kNever;  // monotonic: start of the wait for outstanding confirmations
   PortCounters counters_;
   std::string trouble_;
+  std::string missed_;  // the trouble that NoteMissed found; empty: none
+  HostInstant missed_until_ = kNever;
+  std::uint64_t lost_noted_ = 0;  // of the counters
+  std::uint64_t forged_noted_ = 0;
   Aside aside_;  // of one Receive, kept for its buffers and its stamps
 };
 

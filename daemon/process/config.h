@@ -27,6 +27,7 @@ struct DaemonConfig {
   } fleet;
   struct Store {
     std::string path = "focalfleet.db";
+    std::uint32_t keep_days = 0;  // history older than that goes; 0: all of it stays
   } store;
   struct Control {
     std::string socket = "control.sock";

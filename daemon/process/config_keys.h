@@ -74,6 +74,8 @@ void VisitKeys(Config* c, Visitor* visit) {
               "Distance that arms keep; 0: 0.012 of the layout's pitch");
   visit->Section("store", "The record of every axis, which survives power cuts and kills");
   visit->Path("path", &c->store.path, "The store, an SQLite file; one daemon at a time");
+  visit->Whole("keep_days", &c->store.keep_days, {0, 36'500},
+               "Days after which past moves, measurements and alarms go; 0: they stay");
   visit->Section("control", "The socket of the command line");
   visit->Path("socket", &c->control.socket,
               "Control socket for the command line; owner and group may use it");

@@ -12,14 +12,16 @@
 
 #include "daemon/camera/camera_dds.h"
 #include "daemon/camera/camera_folder.h"
-#include "daemon/hall/measure.h"
 #include "daemon/loop/event_loop.h"
+#include "daemon/loop/status_thread.h"
 #include "daemon/metrics/metrics_endpoint.h"
 #include "daemon/metrics/metrics_sampler.h"
 #include "daemon/process/bounded_end.h"
+#include "daemon/process/caught_jobs.h"
 #include "daemon/process/fleet_setup.h"
 #include "daemon/process/log.h"
 #include "daemon/process/slow_end.h"
+#include "daemon/process/store_upkeep.h"
 #include "daemon/status/buffered_status_publisher.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/store/store.h"
@@ -30,7 +32,6 @@
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/model_upkeep.h"
 #include "daemon/verbs/request_handler.h"
-#include "fleet/plan/job.h"
 
 namespace focalfleet {
 namespace {
@@ -50,12 +51,15 @@ double ProcessCpuSeconds() {
 /// the limit would leave such a driver behind without need. With twice as much, the end of a daemon
 /// with a dead camera would take longer than the 2 s that docs/cli.md promises.
 constexpr std::chrono::milliseconds kEndWithin{1000};
+/// The same for DDS, which takes 0.1 s. Half would be short on a busy host, twice as much over 2 s.
+constexpr std::chrono::milliseconds kStatusEndWithin{500};
 
 /// The parts that report to the service manager.
 struct Service {
   WallTime started = WallTime::Now();
   NotifySocket socket;
   Heartbeat store;
+  Heartbeat status;
   Heartbeat planner;
   Heartbeat camera;
   std::unique_ptr<Watchdog> watchdog;  // none: the manager expects no sign of life
@@ -67,6 +71,8 @@ struct StatusOutput {
   std::unique_ptr<DdsTroubles> troubles;
   std::unique_ptr<BufferedStatusPublisher> publisher;  // none: DDS is off
   std::unique_ptr<StatusScheduler> scheduler;          // none: DDS is off
+  std::unique_ptr<StatusThread> thread;  // none: DDS is off. Ends before the publisher
+  std::unique_ptr<BoundedEnd> ending;
 };
 
 /// Where places of units come from. The thread ends before the workers that it uses.
@@ -101,16 +107,6 @@ ShellNote NoteOfMetrics(const std::string& trouble) {
           "no metrics, the fleet works on and it is tried again: " + trouble};
 }
 
-void Count(const ExposureDone& done, WorkCounters* work) {
-  if (done.exposure && !done.exposure->camera && done.exposure->camera_trouble.empty())
-    return;  // the units' own sensors were enough
-  ++work->exposures;
-  if (done.exposure && done.exposure->camera_trouble.empty())
-    work->exposed_at_s = 1e-9 * static_cast<double>(WallTime::Now().ns);
-  else
-    ++work->exposures_failed;
-}
-
 DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds) {
   return {.domain = dds.domain, .config_xml = dds.config.empty() ? "" : "file://" + dds.config};
 }
@@ -132,6 +128,7 @@ class Daemon {
   std::function<void()> Answering(Heartbeat* heartbeat);
   void OpenService();
   StoreThread::Sinks StoreSinks();
+  Status StartStatusThread();
   Status OpenRequestHandler();
   Status RestoreLastModel();
   void OpenStatus();
@@ -298,11 +295,11 @@ StoreThread::Sinks Daemon::StoreSinks() {
       ++work.rows_refused;
     return done;
   };
-  sinks.publish = [this](const StatusBatch& status) {
-    return status_.publisher != nullptr && status_.publisher->Publish(status);
+  sinks.publish = [this](StatusBatch* status) {
+    return status_.thread == nullptr || status_.thread->Publish(status);
   };
   sinks.alarm = [this](const AlarmValue& alarm) {
-    if (status_.publisher != nullptr) status_.publisher->Publish(alarm);
+    if (status_.thread != nullptr) status_.thread->Publish(alarm);
   };
   sinks.log_error = [](const std::string& text) { spdlog::error("{}", text); };
   sinks.log_info = [](const std::string& text) { spdlog::info("{}", text); };
@@ -317,8 +314,24 @@ std::function<void()> Daemon::Answering(Heartbeat* heartbeat) {
   };
 }
 
+Status Daemon::StartStatusThread() {
+  if (status_.publisher == nullptr) return {};
+  FOCALFLEET_TRY_ASSIGN(
+      status_.thread,
+      StatusThread::Create(
+          {.publish =
+               [this](const StatusBatch& status) { return status_.publisher->Publish(status); },
+           .alarm = [this](const AlarmValue& alarm) { status_.publisher->Publish(alarm); },
+           .room = [this] { stored_.writer->Wake(); },
+           .alive = Answering(&service_.status)}));
+  return {};
+}
+
 Status Daemon::StartThreads() {
-  FOCALFLEET_TRY_ASSIGN(stored_.writer, StoreThread::Create(StoreSinks(), signal_.get()));
+  FOCALFLEET_TRY(StartStatusThread());
+  StoreThread::Sinks sinks = StoreSinks();
+  FOCALFLEET_TRY_ASSIGN(sinks.upkeep, PruningOf(store_.get(), config_.store.keep_days));
+  FOCALFLEET_TRY_ASSIGN(stored_.writer, StoreThread::Create(std::move(sinks), signal_.get()));
   FOCALFLEET_TRY_ASSIGN(
       planner_, PlannerThread::Create(
                     [this, alive = Answering(&service_.planner)](const PlannerWork& work,
@@ -334,10 +347,8 @@ Status Daemon::StartThreads() {
         measuring_.thread,
         CameraThread::Create(
             [this](const CameraWork& work, const std::atomic<bool>& ending) {
-              ExposureDone done =
-                  MeasureUnits(work, measuring_.carriers.get(), measuring_.camera.get(), ending);
-              Count(done, &metrics_.work);
-              return done;
+              return MeasureCaught(work, {measuring_.carriers.get(), measuring_.camera.get()},
+                                   ending, &metrics_.work);
             },
             signal_.get(), {.name = "camera", .alive = Answering(&service_.camera)}));
   }
@@ -367,10 +378,7 @@ Status Daemon::StartThreads() {
 PlanDone Daemon::Plan(const PlannerWork& work, const std::atomic<bool>& ending,
                       const std::function<void()>& alive) {
   const auto begun = std::chrono::steady_clock::now();
-  PlanDone done = RunPlanJob(work.job, *layout_, work.drives, [&ending, &work, &alive] {
-    alive();  // a plan shows that it proceeds by asking whether it is still wanted
-    return ending.load() || (work.given_up != nullptr && work.given_up->load());
-  });
+  PlanDone done = PlanCaught(work, *layout_, ending, alive);
   metrics_.work.planner_s.Observe(SecondsSince(begun));
   if (metrics_.sampler != nullptr && done.plan && !done.plan->moves.empty())
     metrics_.power.Put(
@@ -386,6 +394,8 @@ void Daemon::OpenService() {
     std::vector<Watchdog::Thread> threads = {
         {"store", &service_.store, [this] { stored_.writer->Wake(); }},
         {"planner", &service_.planner, [this] { planner_->Wake(); }}};
+    if (status_.thread != nullptr)
+      threads.push_back({"status", &service_.status, [this] { status_.thread->Wake(); }});
     if (measuring_.thread != nullptr)
       threads.push_back({"camera", &service_.camera, [this] { measuring_.thread->Wake(); }});
     // Rounds begin four times an interval, and a thread has half of one to answer. Two signs of
@@ -430,10 +440,15 @@ Status Daemon::End() {
   const Status stored = stored_.writer->Finish();
   stored_.reader.reset();  // soon: a question that runs is cut short
   handler_->Close();
-  status_.publisher.reset();
+  status_.ending =
+      std::make_unique<BoundedEnd>(std::vector<BoundedEnd::Part>{{"the status", [this] {
+                                                                    status_.thread.reset();
+                                                                    status_.publisher.reset();
+                                                                  }}});
   store_.reset();
   handler_.reset();
-  const std::vector<std::string> left = ending_->Wait(kEndWithin);
+  std::vector<std::string> left = ending_->Wait(kEndWithin);
+  for (std::string& part : status_.ending->Wait(kStatusEndWithin)) left.push_back(std::move(part));
   left_ = !left.empty();
   if (left_)
     spdlog::warn("{} did not end within {} ms and {} left behind", fmt::join(left, ", "),

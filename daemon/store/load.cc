@@ -20,17 +20,27 @@ Status ForEach(Connection& connection, const char* table, int key_columns, const
   }
 }
 
+/// The column holds whether the row's checksum is right.
+void CheckSum(Cells& cells, int column) {
+  if (!cells.error())
+    cells.Require(!cells.IsNull(column) && cells.Flag(column),
+                  "it is not as it was written: its checksum is another");
+}
+
 Status LoadUnits(Connection& connection, StoredFleet* fleet) {
-  return ForEach(connection, "unit", 1,
-                 "SELECT unit_id, serial, enabled, reason FROM unit ORDER BY unit_id",
-                 [fleet](Cells& cells) {
-                   StoredFleet::StoredUnit unit;
-                   unit.unit = {cells.Whole<std::uint32_t>(0)};
-                   unit.serial = {cells.Whole<std::uint32_t>(1)};
-                   unit.enabled = cells.Flag(2);
-                   unit.reason = cells.Text(3);
-                   fleet->units.push_back(std::move(unit));
-                 });
+  return ForEach(
+      connection, "unit", 1,
+      "SELECT unit_id, serial, enabled, reason, checksum = row_checksum(unit_id, serial, "
+      "enabled, reason, at_ns) FROM unit ORDER BY unit_id",
+      [fleet](Cells& cells) {
+        StoredFleet::StoredUnit unit;
+        unit.unit = {cells.Whole<std::uint32_t>(0)};
+        unit.serial = {cells.Whole<std::uint32_t>(1)};
+        unit.enabled = cells.Flag(2);
+        unit.reason = cells.Text(3);
+        CheckSum(cells, 4);
+        fleet->units.push_back(std::move(unit));
+      });
 }
 
 /// Checks a row against itself: vector and turns repeat low, less the offset. A row that
@@ -51,7 +61,9 @@ Status LoadVectors(Connection& connection, StoredFleet* fleet) {
   bool half = false;  // theta of the last serial was read, phi not yet
   FOCALFLEET_TRY(ForEach(connection, "axis_state", 2,
                          "SELECT serial, axis, witness, low, high, move, subdivision, vector, "
-                         "turns, origin, offset FROM axis_state "
+                         "turns, origin, offset, "
+                         "checksum = row_checksum(serial, axis, witness, low, high, vector, turns, "
+                         "subdivision, move, origin, at_ns, offset) FROM axis_state "
                          "ORDER BY serial, axis",
                          [fleet, &half](Cells& cells) {
                            const SerialNumber serial = cells.Serial(0);
@@ -77,6 +89,7 @@ Status LoadVectors(Connection& connection, StoredFleet* fleet) {
                            row.knowledge[Index(axis)] = knowledge;
                            row.subdivision[Index(axis)] = subdivision;
                            row.offset[Index(axis)] = offset;
+                           CheckSum(cells, 11);
                            half = axis == Axis::kTheta;
                          }));
   if (!half) return {};
@@ -90,7 +103,9 @@ Status LoadOpenIntents(Connection& connection, StoredFleet* fleet) {
   return ForEach(
       connection, "intent", 1,
       "SELECT entry, configuration, serial, unit_id, move, theta_from, phi_from, theta_to, phi_to, "
-      "theta_low, theta_high, phi_low, phi_high FROM intent WHERE end IS NULL ORDER BY entry",
+      "theta_low, theta_high, phi_low, phi_high, checksum = row_checksum(configuration, unit_id, "
+      "serial, move, theta_from, phi_from, theta_to, phi_to, theta_low, theta_high, phi_low, "
+      "phi_high), end FROM intent INDEXED BY intent_open WHERE end IS NULL ORDER BY entry",
       [fleet](Cells& cells) {
         const auto vectors = [&cells](int column) { return cells.Whole<std::int32_t>(column); };
         IntentRow row;
@@ -104,6 +119,8 @@ Status LoadOpenIntents(Connection& connection, StoredFleet* fleet) {
         row.hull[1] = {Witness::kInterval, vectors(11), vectors(12)};
         cells.Require(row.hull[0].low <= row.hull[0].high && row.hull[1].low <= row.hull[1].high,
                       "low is above high");
+        cells.Require(cells.IsNull(14), "it is open and has ended");
+        CheckSum(cells, 13);
         fleet->open_intents.push_back(row);
       });
 }
@@ -111,8 +128,8 @@ Status LoadOpenIntents(Connection& connection, StoredFleet* fleet) {
 Status LoadParameters(Connection& connection, StoredFleet* fleet) {
   return ForEach(
       connection, "parameter", 3,
-      "SELECT serial, axis, parameter, value, origin FROM parameter ORDER BY serial, axis, "
-      "parameter",
+      "SELECT serial, axis, parameter, value, origin, checksum = row_checksum(serial, axis, "
+      "parameter, value, origin, at_ns) FROM parameter ORDER BY serial, axis, parameter",
       [fleet](Cells& cells) {
         ParameterRow row;
         row.serial = cells.Serial(0);
@@ -120,6 +137,7 @@ Status LoadParameters(Connection& connection, StoredFleet* fleet) {
         row.parameter = cells.Code(2, kLastParameter);
         row.value = cells.Whole<std::int32_t>(3);
         row.origin = cells.Code(4, kLastOrigin);
+        CheckSum(cells, 5);
         fleet->parameters.push_back(row);
       });
 }
@@ -128,8 +146,12 @@ Status LoadTunings(Connection& connection, StoredFleet* fleet) {
   return ForEach(
       connection, "tuning", 2,
       "SELECT serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision, "
-      "mode, origin FROM tuning ORDER BY serial, axis",
-      [fleet](Cells& cells) { fleet->tunings.push_back(ReadTuning(cells, 0)); });
+      "mode, origin, checksum = row_checksum(serial, axis, critical, repeat, margin, load_uNm, "
+      "v_bus_V, counter1, subdivision, mode, origin, at_ns) FROM tuning ORDER BY serial, axis",
+      [fleet](Cells& cells) {
+        fleet->tunings.push_back(ReadTuning(cells, 0));
+        CheckSum(cells, 11);
+      });
 }
 
 Status LoadConfigurations(Connection& connection, StoredFleet* fleet) {
@@ -167,21 +189,23 @@ Status LoadMutes(Connection& connection, StoredFleet* fleet) {
 }
 
 Status LoadNextIds(Connection& connection, StoredFleet* fleet) {
-  FOCALFLEET_TRY(
-      ForEach(connection, "meta", 1, "SELECT key, value FROM meta", [fleet](Cells& cells) {
-        const std::string key = cells.Text(0);
-        if (key == "next_move") {
-          fleet->next_move = {cells.Whole<std::uint16_t>(1)};
-        } else if (key == "next_configuration") {
-          fleet->next_configuration = cells.Whole<std::uint64_t>(1);
-        } else if (key == "next_exposure") {
-          fleet->next_exposure = cells.Whole<std::uint64_t>(1);
-        } else if (key == "next_alarm") {
-          fleet->next_alarm = cells.Whole<std::uint64_t>(1);
-        } else {
-          cells.Require(false, "nobody reads this key");
-        }
-      }));
+  FOCALFLEET_TRY(ForEach(connection, "meta", 1,
+                         "SELECT key, value, checksum = row_checksum(key, value) FROM meta",
+                         [fleet](Cells& cells) {
+                           const std::string key = cells.Text(0);
+                           if (key == "next_move") {
+                             fleet->next_move = {cells.Whole<std::uint16_t>(1)};
+                           } else if (key == "next_configuration") {
+                             fleet->next_configuration = cells.Whole<std::uint64_t>(1);
+                           } else if (key == "next_exposure") {
+                             fleet->next_exposure = cells.Whole<std::uint64_t>(1);
+                           } else if (key == "next_alarm") {
+                             fleet->next_alarm = cells.Whole<std::uint64_t>(1);
+                           } else {
+                             cells.Require(false, "nobody reads this key");
+                           }
+                           CheckSum(cells, 2);
+                         }));
   return {};
 }
 
@@ -201,6 +225,7 @@ Status LoadAll(Connection& connection, StoredFleet* fleet) {
 
 Result<StoredFleet> LoadFleet(Connection& connection) {
   StoredFleet fleet;
+  connection.Rollback();
   FOCALFLEET_TRY(connection.Execute("BEGIN"));
   const Status loaded = LoadAll(connection, &fleet);
   connection.Rollback();  // nothing was written

@@ -366,8 +366,28 @@ CREATE TABLE mute(
 ) STRICT, WITHOUT ROWID;
 )sql";
 
+// Checksums of the rows that decide where a unit stands, whether it moves and how. A checksum
+// covers the columns named here; those of an intent do not change when it ends.
+constexpr const char* kVersion10 = R"sql(
+ALTER TABLE axis_state ADD COLUMN checksum INTEGER;
+UPDATE axis_state SET checksum = row_checksum(serial, axis, witness, low, high, vector, turns,
+  subdivision, move, origin, at_ns, offset);
+ALTER TABLE unit ADD COLUMN checksum INTEGER;
+UPDATE unit SET checksum = row_checksum(unit_id, serial, enabled, reason, at_ns);
+ALTER TABLE parameter ADD COLUMN checksum INTEGER;
+UPDATE parameter SET checksum = row_checksum(serial, axis, parameter, value, origin, at_ns);
+ALTER TABLE tuning ADD COLUMN checksum INTEGER;
+UPDATE tuning SET checksum = row_checksum(serial, axis, critical, repeat, margin, load_uNm, v_bus_V,
+  counter1, subdivision, mode, origin, at_ns);
+ALTER TABLE meta ADD COLUMN checksum INTEGER;
+UPDATE meta SET checksum = row_checksum(key, value);
+ALTER TABLE intent ADD COLUMN checksum INTEGER;  -- NULL: it ended before rows had checksums
+UPDATE intent SET checksum = row_checksum(configuration, unit_id, serial, move, theta_from,
+  phi_from, theta_to, phi_to, theta_low, theta_high, phi_low, phi_high) WHERE end IS NULL;
+)sql";
+
 constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4, kVersion5,
-                                       kVersion6, kVersion7, kVersion8, kVersion9};
+                                       kVersion6, kVersion7, kVersion8, kVersion9, kVersion10};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

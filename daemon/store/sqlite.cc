@@ -1,5 +1,7 @@
 #include "daemon/store/sqlite.h"
 
+#include "daemon/store/row_checksum.h"
+
 namespace focalfleet::store_internal {
 namespace {
 
@@ -56,6 +58,9 @@ Result<std::unique_ptr<Connection>> Connection::Open(const std::string& path, Mo
   // the schema itself may not be written.
   sqlite3_db_config(db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_db_config(db, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  if (auto added = AddRowChecksum(db); !added)
+    return tl::unexpected<Error>(connection->Named(added.error()));
+  FOCALFLEET_TRY_ASSIGN(connection->rollback_, connection->Prepare("ROLLBACK"));
   return connection;
 }
 
@@ -84,9 +89,7 @@ Result<std::int64_t> Connection::Integer(const char* sql) {
 
 void Connection::Rollback() {
   // After some errors SQLite has undone the transaction by itself; then this does nothing.
-  if (sqlite3_get_autocommit(db()) == 0) {
-    sqlite3_exec(db(), "ROLLBACK", nullptr, nullptr, nullptr);
-  }
+  if (sqlite3_get_autocommit(db()) == 0) static_cast<void>(rollback_.Run());
 }
 
 Error Connection::Named(Error error) const {

@@ -81,7 +81,8 @@ class Connection {
   Status Execute(const char* sql);
   /// The one integer that `sql` yields.
   Result<std::int64_t> Integer(const char* sql);
-  /// An open transaction is undone. The connection can be used again.
+  /// An open transaction is undone, unless there is no memory for that. Call it before a
+  /// transaction, too: one that could not be undone is undone then.
   void Rollback();
 
   [[nodiscard]] sqlite3* db() const { return db_.get(); }
@@ -97,6 +98,7 @@ class Connection {
   };
   std::string path_;
   std::unique_ptr<sqlite3, Close> db_;
+  Statement rollback_;  // made beforehand: where memory ends, it could not be made
 };
 
 }  // namespace focalfleet::store_internal

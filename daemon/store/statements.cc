@@ -8,9 +8,8 @@ namespace {
 // The row is replaced as a whole: ON CONFLICT DO UPDATE reads it first, and costs a fifth more.
 constexpr const char* kAxis =
     "INSERT OR REPLACE INTO axis_state(serial, axis, witness, low, high, vector, turns, "
-    "subdivision, move, origin, at_ns, offset) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, "
-    "?11, "
-    "?12)";
+    "subdivision, move, origin, at_ns, offset, checksum) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, "
+    "?9, ?10, ?11, ?12, row_checksum(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12))";
 constexpr const char* kAxisChanged =
     "INSERT INTO axis_history(serial, axis, witness, low, high, subdivision, origin, at_ns) "
     "SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE NOT EXISTS(SELECT 1 FROM axis_state WHERE serial "
@@ -19,12 +18,12 @@ constexpr const char* kAxisChanged =
 constexpr const char* kIntent =
     "INSERT INTO intent(configuration, unit_id, serial, move, theta_from, phi_from, theta_to, "
     "phi_to, theta_low, "
-    "theta_high, phi_low, phi_high, began_ns) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, "
-    "?12, ?13) "
+    "theta_high, phi_low, phi_high, began_ns, checksum) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, "
+    "?10, ?11, ?12, ?13, row_checksum(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)) "
     "ON CONFLICT(serial, move) WHERE end IS NULL DO UPDATE SET configuration = ?1, unit_id = ?2, "
     "theta_from = ?5, phi_from = ?6, theta_to = ?7, phi_to = ?8, theta_low = ?9, theta_high = ?10, "
     "phi_low = ?11, "
-    "phi_high = ?12";
+    "phi_high = ?12, checksum = excluded.checksum";
 constexpr const char* kIntentEnd =
     "UPDATE intent SET end = ?3, ended_ns = ?4, (theta_end_witness, theta_end_low, theta_end_high) "
     "= "
@@ -37,13 +36,18 @@ constexpr const char* kUnboundElsewhere =
     "SELECT unit_id, 0, enabled, reason, ?3 FROM unit WHERE serial = ?2 AND unit_id <> ?1 AND ?2 "
     "<> 0";
 constexpr const char* kUnbindElsewhere =
-    "UPDATE unit SET serial = 0, at_ns = ?3 WHERE serial = ?2 AND unit_id <> ?1 AND ?2 <> 0";
+    "UPDATE unit SET serial = 0, at_ns = ?3, checksum = row_checksum(unit_id, 0, enabled, reason, "
+    "?3) WHERE serial = ?2 AND unit_id <> ?1 AND ?2 <> 0";
 constexpr const char* kBind =
-    "INSERT INTO unit(unit_id, serial, enabled, reason, at_ns) VALUES(?1, ?2, 1, '', ?3) "
-    "ON CONFLICT(unit_id) DO UPDATE SET serial = ?2, at_ns = ?3 WHERE serial <> ?2";
+    "INSERT INTO unit(unit_id, serial, enabled, reason, at_ns, checksum) "
+    "VALUES(?1, ?2, 1, '', ?3, row_checksum(?1, ?2, 1, '', ?3)) "
+    "ON CONFLICT(unit_id) DO UPDATE SET serial = ?2, at_ns = ?3, "
+    "checksum = row_checksum(?1, ?2, enabled, reason, ?3) WHERE serial <> ?2";
 constexpr const char* kEnable =
-    "INSERT INTO unit(unit_id, serial, enabled, reason, at_ns) VALUES(?1, 0, ?2, ?3, ?4) "
-    "ON CONFLICT(unit_id) DO UPDATE SET enabled = ?2, reason = ?3, at_ns = ?4 "
+    "INSERT INTO unit(unit_id, serial, enabled, reason, at_ns, checksum) "
+    "VALUES(?1, 0, ?2, ?3, ?4, row_checksum(?1, 0, ?2, ?3, ?4)) "
+    "ON CONFLICT(unit_id) DO UPDATE SET enabled = ?2, reason = ?3, at_ns = ?4, "
+    "checksum = row_checksum(?1, serial, ?2, ?3, ?4) "
     "WHERE enabled <> ?2 OR reason <> ?3";
 // This statement runs straight after kBind or kEnable, and adds an entry only where they changed a
 // row.
@@ -56,9 +60,10 @@ constexpr const char* kParameterChanged =
     "axis = ?2 AND "
     "parameter = ?3 AND value = ?4 AND origin = ?5)";
 constexpr const char* kParameter =
-    "INSERT INTO parameter(serial, axis, parameter, value, origin, at_ns) VALUES(?1, ?2, ?3, ?4, "
-    "?5, ?6) "
-    "ON CONFLICT(serial, axis, parameter) DO UPDATE SET value = ?4, origin = ?5, at_ns = ?6 "
+    "INSERT INTO parameter(serial, axis, parameter, value, origin, at_ns, checksum) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, row_checksum(?1, ?2, ?3, ?4, ?5, ?6)) "
+    "ON CONFLICT(serial, axis, parameter) DO UPDATE SET value = ?4, origin = ?5, at_ns = ?6, "
+    "checksum = excluded.checksum "
     "WHERE value <> ?4 OR origin <> ?5";
 constexpr const char* kTuningKept =
     "INSERT INTO tuning_history(serial, axis, critical, repeat, margin, load_uNm, v_bus_V, "
@@ -66,8 +71,9 @@ constexpr const char* kTuningKept =
     "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
 constexpr const char* kTuning =
     "INSERT OR REPLACE INTO tuning(serial, axis, critical, repeat, margin, load_uNm, v_bus_V, "
-    "counter1, subdivision, mode, origin, at_ns) "
-    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
+    "counter1, subdivision, mode, origin, at_ns, checksum) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, "
+    "row_checksum(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12))";
 constexpr const char* kMeasurement =
     "INSERT OR REPLACE INTO measurement(exposure, unit_id, serial, configuration, status, "
     "other, x_mm, y_mm, sigma_um, theta, phi, error_um, target_x_mm, target_y_mm, at_ns, "
@@ -108,10 +114,11 @@ constexpr const char* kOpenAlarm =
 constexpr const char* kMute =
     "INSERT OR REPLACE INTO mute(name, until_ns, since_ns, reason, by) VALUES(?1, ?2, ?3, ?4, ?5)";
 constexpr const char* kRaiseMeta =
-    "INSERT INTO meta(key, value) VALUES(?1, ?2) ON CONFLICT(key) DO UPDATE SET value = ?2 WHERE "
-    "value < ?2";
+    "INSERT INTO meta(key, value, checksum) VALUES(?1, ?2, row_checksum(?1, ?2)) "
+    "ON CONFLICT(key) DO UPDATE SET value = ?2, checksum = excluded.checksum WHERE value < ?2";
 constexpr const char* kSetMeta =
-    "INSERT INTO meta(key, value) VALUES(?1, ?2) ON CONFLICT(key) DO UPDATE SET value = ?2";
+    "INSERT INTO meta(key, value, checksum) VALUES(?1, ?2, row_checksum(?1, ?2)) "
+    "ON CONFLICT(key) DO UPDATE SET value = ?2, checksum = excluded.checksum";
 
 }  // namespace
 

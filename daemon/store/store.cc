@@ -1,5 +1,6 @@
 #include "daemon/store/store.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <variant>
 
@@ -9,12 +10,17 @@
 #include "daemon/store/schema.h"
 #include "daemon/store/sqlite.h"
 #include "daemon/store/statements.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 
 using namespace store_internal;
 
 namespace {
+
+/// Rows of a table that one call of Prune looks at. Those that stay for ever, the last homing of
+/// each unit, are kUnits at most.
+constexpr std::int64_t kPruneWindow = 4 * std::int64_t{limits::kUnits};
 
 /// The path by which all names of this file lock the same lock.
 std::string Canonical(const std::string& path) {
@@ -37,10 +43,26 @@ Status SetUp(Connection& connection) {
   FOCALFLEET_TRY(connection.Execute("PRAGMA synchronous = FULL"));
   FOCALFLEET_TRY(connection.Execute("PRAGMA journal_size_limit = 16777216"));
   FOCALFLEET_TRY(connection.Execute("PRAGMA cell_size_check = ON"));
+  // Without this promise of the file layer, a sync that fails once loses what later commits call
+  // durable: the padding of a sector is written after the sync and never again.
+  int powersafe = -1;
+  sqlite3_file_control(connection.db(), "main", SQLITE_FCNTL_POWERSAFE_OVERWRITE, &powersafe);
+  if (powersafe != 1)
+    return Fail(ErrorCode::kUnavailable,
+                "store " + connection.path() +
+                    ": SQLite takes this disk for one that spoils bytes beside those it writes");
   return Migrate(connection, version, Migrations());
 }
 
 }  // namespace
+
+WallTime OldBefore(const HistoryAge& age) {
+  constexpr std::int64_t kDayNs = 86'400'000'000'000;
+  if (age.keep_days == 0 || age.newest.ns == 0) return WallTime{0};
+  const std::int64_t now_ns =
+      std::min(age.now.ns, age.newest.ns + static_cast<std::int64_t>(1e9 * age.open_s));
+  return WallTime{now_ns - age.keep_days * kDayNs};
+}
 
 Store::Store() = default;
 Store::~Store() = default;
@@ -82,6 +104,7 @@ Status Store::Commit(std::span<const Row> rows, WallTime now, std::size_t* refus
   for (std::size_t k = 0; k < rows.size(); ++k)
     if (const char* const flaw = Flaw(rows[k]))
       return Reject(refuse(k, {ErrorCode::kInvalid, flaw}));
+  connection_->Rollback();
   if (auto begun = (*statements_)[Sql::kBegin].Run(); !begun) return Rollback(begun.error());
   RowWriter writer(statements_.get(), now);
   const auto write = [&](std::size_t k) -> Status {
@@ -107,24 +130,55 @@ Status Store::Commit(std::span<const Row> rows, WallTime now, std::size_t* refus
   return {};
 }
 
+Result<WallTime> Store::Newest() {
+  FOCALFLEET_TRY_ASSIGN(
+      const std::int64_t ns,
+      connection_->Integer(
+          "SELECT max(coalesce((SELECT max(began_ns, coalesce(ended_ns, 0)) FROM intent ORDER BY "
+          "entry DESC LIMIT 1), 0), coalesce((SELECT at_ns FROM alarm ORDER BY id DESC LIMIT 1), "
+          "0), coalesce((SELECT changed_ns FROM configuration ORDER BY id DESC LIMIT 1), 0))"));
+  return WallTime{ns};
+}
+
 Result<std::uint64_t> Store::Prune(WallTime before, std::uint32_t rows_max) {
+  // Keys ascend with time, so only the first kPruneWindow rows of a table are looked at: a look at
+  // all of two million motions takes a second.
   constexpr const char* kDelete[] = {
-      "DELETE FROM intent WHERE entry IN (SELECT entry FROM intent WHERE end IS NOT NULL AND "
-      "ended_ns < ?1 "
-      "ORDER BY entry LIMIT ?2)",
-      "DELETE FROM configuration WHERE id IN (SELECT id FROM configuration WHERE changed_ns < ?1 "
-      "AND state >= 3 "
-      "ORDER BY id LIMIT ?2)",
-      "DELETE FROM measurement WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM "
-      "measurement WHERE at_ns < ?1 ORDER BY exposure LIMIT ?2)",
-      "DELETE FROM orientation WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM "
-      "orientation WHERE at_ns < ?1 ORDER BY exposure LIMIT ?2)",
-      "DELETE FROM alarm WHERE id IN (SELECT id FROM alarm WHERE at_ns < ?1 ORDER BY id LIMIT ?2)",
-      "DELETE FROM open_alarm WHERE id IN (SELECT id FROM open_alarm WHERE last_ns < ?1 AND "
-      "state = 2 ORDER BY id LIMIT ?2)",
+      // The last homing of a unit stays: a model from before it does not hold for this unit.
+      "DELETE FROM intent WHERE entry IN (SELECT entry FROM (SELECT entry, unit_id, end, ended_ns "
+      "FROM intent ORDER BY entry LIMIT ?3) AS old WHERE end IS NOT NULL AND ended_ns < ?1 AND "
+      "(end <> 5 OR EXISTS(SELECT 1 FROM intent AS later WHERE later.unit_id = old.unit_id AND "
+      "later.end = 5 AND later.entry > old.entry)) LIMIT ?2)",
+      "DELETE FROM configuration WHERE id IN (SELECT id FROM (SELECT id, state, changed_ns FROM "
+      "configuration ORDER BY id LIMIT ?3) WHERE changed_ns < ?1 AND state >= 3 AND "
+      "id <> (SELECT max(id) FROM configuration) LIMIT ?2)",
+      "DELETE FROM measurement WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM (SELECT "
+      "exposure, unit_id, at_ns FROM measurement ORDER BY exposure, unit_id LIMIT ?3) WHERE "
+      "at_ns < ?1 LIMIT ?2)",
+      "DELETE FROM orientation WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM (SELECT "
+      "exposure, unit_id, at_ns FROM orientation ORDER BY exposure, unit_id LIMIT ?3) WHERE "
+      "at_ns < ?1 LIMIT ?2)",
+      "DELETE FROM alarm WHERE id IN (SELECT id FROM (SELECT id, at_ns FROM alarm ORDER BY id "
+      "LIMIT "
+      "?3) WHERE at_ns < ?1 LIMIT ?2)",
+      "DELETE FROM open_alarm WHERE id IN (SELECT id FROM (SELECT id, last_ns, state FROM "
+      "open_alarm ORDER BY id LIMIT ?3) WHERE last_ns < ?1 AND state = 2 LIMIT ?2)",
+      "DELETE FROM parameter_history WHERE entry IN (SELECT entry FROM (SELECT entry, at_ns FROM "
+      "parameter_history ORDER BY entry LIMIT ?3) WHERE at_ns < ?1 LIMIT ?2)",
+      "DELETE FROM tuning_history WHERE entry IN (SELECT entry FROM (SELECT entry, at_ns FROM "
+      "tuning_history ORDER BY entry LIMIT ?3) WHERE at_ns < ?1 LIMIT ?2)",
+      // The next two keep entries since the first model: these say for which units a model holds.
+      "DELETE FROM axis_history WHERE entry IN (SELECT entry FROM (SELECT entry, at_ns FROM "
+      "axis_history ORDER BY entry LIMIT ?3) WHERE at_ns < ?1 AND at_ns < (SELECT "
+      "coalesce(min(at_ns), ?1) FROM model_change) LIMIT ?2)",
+      "DELETE FROM unit_history WHERE entry IN (SELECT entry FROM (SELECT entry, at_ns FROM "
+      "unit_history ORDER BY entry LIMIT ?3) WHERE at_ns < ?1 AND at_ns < (SELECT "
+      "coalesce(min(at_ns), ?1) FROM model_change) LIMIT ?2)",
   };
+  static_assert(IntentEnd::kHomed == IntentEnd{5});
   static_assert(ConfigurationState::kDone == ConfigurationState{3});
   std::uint64_t deleted = 0;
+  connection_->Rollback();
   if (auto begun = (*statements_)[Sql::kBegin].Run(); !begun) {
     return tl::unexpected<Error>(Rollback(begun.error()).error());
   }
@@ -133,6 +187,7 @@ Result<std::uint64_t> Store::Prune(WallTime before, std::uint32_t rows_max) {
     if (!statement) return tl::unexpected<Error>(Rollback(statement.error()).error());
     statement->Bind(1, before.ns);
     statement->Bind(2, rows_max);
+    statement->Bind(3, kPruneWindow);
     if (auto done = statement->Run(); !done) {
       return tl::unexpected<Error>(Rollback(done.error()).error());
     }

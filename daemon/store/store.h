@@ -35,6 +35,17 @@ struct StoreCounters {
   std::uint64_t failed = 0;  // transactions that were rolled back
 };
 
+/// Facts by which history is old.
+struct HistoryAge {
+  WallTime now;                 // by the wall clock
+  WallTime newest;              // row of the history when the store was opened; 0: there was none
+  double open_s = 0;            // since then, by a clock that does not step
+  std::uint32_t keep_days = 0;  // 0: all history stays
+};
+/// History from before is old. The wall clock alone would not do: after a step into the future all
+/// history would be old. The newest row at the start and the time since bound it.
+WallTime OldBefore(const HistoryAge& age);
+
 /// The writer of a store.
 class Store {
  public:
@@ -61,9 +72,13 @@ class Store {
   /// Cost: one prepared statement a row (two for a VectorRow), no allocation, one fsync.
   Status Commit(std::span<const Row> rows, WallTime now, std::size_t* refused = nullptr);
 
-  /// Ended moves, configurations, measurements and alarms before `before` are gone, at most
-  /// `rows_max` of each table, so that the transaction stays short. Rows that the coordinator loads
-  /// are never pruned. The result is the number of rows that are gone.
+  /// The time of the newest row of the history; 0: there is none.
+  Result<WallTime> Newest();
+
+  /// Ended moves, configurations, measurements, alarms and histories before `before` are gone, at
+  /// most `rows_max` of each table, so that the transaction stays short. Rows that a start of the
+  /// daemon reads stay: what the coordinator loads, and what says for which units a model holds.
+  /// Texts of models stay. The result is the number of rows that are gone.
   Result<std::uint64_t> Prune(WallTime before, std::uint32_t rows_max);
 
   [[nodiscard]] const StoreCounters& counters() const { return counters_; }

@@ -44,7 +44,7 @@ const OpenAlarmRow* AlarmRegister::Raise(const AlarmRow& alarm, WallTime now) {
            .bus = alarm.bus,
            .count = 0,
            .first_unix_ns = now.ns};
-  ++row.count;
+  row.count += alarm.times;
   row.text = alarm.text;
   row.last_unix_ns = now.ns;
   return &row;

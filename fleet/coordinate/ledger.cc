@@ -8,6 +8,16 @@
 namespace focalfleet {
 namespace {
 
+/// The first kNotedSingly of equal alarms within the window are noted, and the others become one. A
+/// controller that flaps a thousand times a second is then four rows a minute. With half of the
+/// window an operator who looks each minute finds two lines, with twice as much the newest state is
+/// two minutes old.
+constexpr DurationNs kFoldWindow = Seconds(60);
+constexpr std::uint32_t kNotedSingly = 3;
+/// A condition whose alarm was folded is noted once it has lasted for so long. Half would note each
+/// flap of a slow one; with twice as much, operators would see it later than they look.
+constexpr DurationNs kFoldedLasts = Seconds(2);
+
 MoveId MoveAfter(MoveId move, std::uint32_t count) {
   constexpr std::uint32_t kIds = 65'535;  // 0 is none
   return {static_cast<std::uint16_t>((move.value + count - 1) % kIds + 1)};
@@ -67,20 +77,67 @@ void Ledger::ReserveMoves() {
 
 void Ledger::Raise(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
                    std::string text) {
-  const AlarmKind& kind = KindOf(name);
-  AlarmRow row{.id = next_alarm_++,
-               .severity = kind.severity,
-               .unit = {},
-               .bus = bus,
-               .text = std::move(text),
-               .name = name};
-  if (unit) row.unit = layout_.unit(*unit).id;
-  if (kind.life == AlarmLife::kCondition || kind.life == AlarmLife::kOfHost) {
-    const Condition condition{name, row.unit, row.bus};
-    conditions_.insert(condition);
-    unconfirmed_.erase(condition);
+  Condition alarm{name, {}, bus};
+  if (unit) alarm.unit = layout_.unit(*unit).id;
+  const AlarmLife life = KindOf(name).life;
+  if (life == AlarmLife::kCondition || life == AlarmLife::kOfHost) {
+    conditions_.insert(alarm);
+    unconfirmed_.erase(alarm);
   }
-  Note(std::move(row));
+  const auto [at, is_first] = repeats_.try_emplace(alarm, Repeats{step_.now, step_.now});
+  Repeats& repeats = at->second;
+  repeats.last = step_.now;
+  if (repeats.noted < kNotedSingly) {
+    ++repeats.noted;
+    fold_at_ = std::min(fold_at_, repeats.since + kFoldWindow);
+    NoteAlarm(alarm, std::move(text), 1);
+    return;
+  }
+  ++repeats.folded;
+  repeats.text = std::move(text);
+  fold_at_ = std::min(fold_at_, step_.now + kFoldedLasts);
+}
+
+void Ledger::NoteAlarm(const Condition& alarm, std::string text, std::uint32_t times) {
+  Note(AlarmRow{.id = next_alarm_++,
+                .severity = KindOf(alarm.name).severity,
+                .unit = alarm.unit,
+                .bus = alarm.bus,
+                .text = std::move(text),
+                .name = alarm.name,
+                .times = times});
+}
+
+// The window after one with folded alarms has no single ones: what goes on stays one line a window.
+void Ledger::NoteFolded() {
+  if (step_.now < fold_at_) return;
+  fold_at_ = kNever;
+  for (auto at = repeats_.begin(); at != repeats_.end();) {
+    const Condition& alarm = at->first;
+    Repeats& repeats = at->second;
+    const bool window_over = step_.now - repeats.since >= kFoldWindow;
+    const bool has_life = KindOf(alarm.name).life == AlarmLife::kCondition ||
+                          KindOf(alarm.name).life == AlarmLife::kOfHost;
+    const bool lasts = has_life && conditions_.contains(alarm);
+    const bool due =
+        repeats.folded > 0 && (window_over || (lasts && step_.now - repeats.last >= kFoldedLasts));
+    if (due) {
+      const auto seconds = (step_.now - repeats.since).ns / 1'000'000'000;
+      NoteAlarm(alarm,
+                repeats.text + " (" + std::to_string(repeats.folded) + " times more in " +
+                    std::to_string(seconds) + " s)",
+                repeats.folded);
+      if (has_life && !lasts) Note(AlarmEndRow{alarm.name, alarm.unit, alarm.bus});
+      if (window_over) repeats.since = step_.now;
+      repeats.folded = 0;
+    } else if (window_over) {
+      at = repeats_.erase(at);
+      continue;
+    }
+    fold_at_ = std::min(fold_at_, repeats.since + kFoldWindow);
+    if (repeats.folded > 0 && lasts) fold_at_ = std::min(fold_at_, repeats.last + kFoldedLasts);
+    ++at;
+  }
 }
 
 bool Ledger::Lasts(AlarmName name, PositionerIndex unit) const {
@@ -175,6 +232,7 @@ void Ledger::BeginStep(std::uint64_t committed_through, bool store_failing) {
   store_failing_ = store_failing;
   if (reserved_by_ == 0) ReserveMoves();
   EndUnconfirmed();
+  NoteFolded();
 }
 
 void Ledger::CloseBatch() {

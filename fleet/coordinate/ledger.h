@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -30,7 +31,9 @@ class Ledger {
   void Note(AnyRow&& row) {
     step_.out->rows.emplace_back(std::forward<AnyRow>(row));
   }
-  /// Notes an alarm, with the severity of its name.
+  /// Notes an alarm, with the severity of its name. The first few of equal ones (of one name, unit
+  /// and bus) in quick succession are noted. The others are folded into one later: "n times in m
+  /// s".
   void Raise(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
              std::string text);
   /// The condition of an alarm has ended, if it was one. Cost: a look-up among lasting conditions.
@@ -84,6 +87,17 @@ class Ledger {
     auto operator<=>(const Condition&) const = default;
   };
 
+  /// Equal alarms of the last while.
+  struct Repeats {
+    HostInstant since;  // the first of the window
+    HostInstant last;   // the newest
+    std::uint32_t noted = 0;
+    std::uint32_t folded = 0;
+    std::string text = {};  // of the newest that was folded
+  };
+
+  void NoteAlarm(const Condition& alarm, std::string text, std::uint32_t times);
+  void NoteFolded();
   void ReserveMoves();
   void EndUnconfirmed();
   /// Conditions of units, buses, sensors and a camera that an earlier run had and this one has not
@@ -100,6 +114,8 @@ class Ledger {
   std::uint64_t next_alarm_ = 1;
   std::uint64_t next_exposure_ = 1;
   std::set<Condition> conditions_;
+  std::map<Condition, Repeats> repeats_;
+  HostInstant fold_at_ = kNever;  // NoteFolded has something to do then
   // Conditions of the host that an earlier run has left, until `confirm_until_`.
   std::set<Condition> unconfirmed_;
   HostInstant confirm_until_ = kNever;

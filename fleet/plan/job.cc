@@ -107,4 +107,13 @@ PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const Un
   return done;
 }
 
+PlanDone PlanFailed(const PlanJob& job, Error why) {
+  PlanDone done{.job = job.job, .purpose = job.purpose, .plan = Plan{}};
+  if (job.late)
+    done.late = tl::unexpected(std::move(why));
+  else
+    done.plan = tl::unexpected(std::move(why));
+  return done;
+}
+
 }  // namespace focalfleet

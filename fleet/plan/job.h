@@ -19,4 +19,7 @@ namespace focalfleet {
 PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives,
                     const Abandoned& abandoned = {});
 
+/// The answer to a job that was not done, and why.
+PlanDone PlanFailed(const PlanJob& job, Error why);
+
 }  // namespace focalfleet

@@ -48,7 +48,9 @@ std::vector<PlanDone> DelayedPlanner::TakeDue(HostInstant now, const Layout& lay
                                               std::span<const UnitDrive> drives) {
   std::vector<PlanDone> done;
   for (; due() <= now; waiting_.pop_front()) {
-    done.push_back(RunPlanJob(waiting_.front().job, layout, drives));
+    done.push_back(fails ? PlanFailed(waiting_.front().job,
+                                      {ErrorCode::kUnavailable, "the planner failed: no memory"})
+                         : RunPlanJob(waiting_.front().job, layout, drives));
     if (done.back().plan) last_plan_ = *done.back().plan;
   }
   return done;

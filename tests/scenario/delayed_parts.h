@@ -65,6 +65,8 @@ class DelayedPlanner {
                                               std::span<const UnitDrive> drives);
   void Restart() { waiting_.clear(); }
   [[nodiscard]] HostInstant due() const { return waiting_.empty() ? kNever : waiting_.front().at; }
+  /// Every job fails.
+  bool fails = false;
   /// The plan that the coordinator was given last.
   [[nodiscard]] const Plan& last_plan() const { return last_plan_; }
 

@@ -54,6 +54,22 @@ TEST(Configuration, FailingStoreStartsNothingAndRefusesTheNext) {
   EXPECT_TRUE(fleet.LastReply(refused)->error);
 }
 
+TEST(Configuration, APlannerThatFailsEndsItAndTheNextOneGoes) {
+  InProcessFleet fleet(Small(46));
+  fleet.Run(Seconds(3));
+  fleet.planner.fails = true;
+  const auto request = fleet.ApplyRandom(46);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kFailed);
+  ASSERT_TRUE(fleet.LastReply(request));
+  ASSERT_TRUE(fleet.LastReply(request)->error);
+  EXPECT_NE(fleet.LastReply(request)->error->text.find("no memory"), std::string::npos);
+  fleet.planner.fails = false;
+  fleet.ApplyRandom(47);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), 37u);
+}
+
 TEST(Configuration, ARowThatTheStoreRefusesTakesItsUnitAloneOut) {
   InProcessFleet fleet(Small(45));
   fleet.Run(Seconds(3));

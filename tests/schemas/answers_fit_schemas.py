@@ -285,6 +285,9 @@ def operate(s):
     """The commands of a daemon, and what goes wrong on the way."""
     s.ask("status")
     s.ask("unit 3")
+    s.ask("store check focalfleet.db", command="store check")
+    s.ask("store backup focalfleet.db backup.db", command="store backup")
+    s.ask("store restore backup.db restored.db", command="store restore")
     s.ask("model show", command="model show")
     s.ask("measurements", exits=(0, 1))
     watch = s.start("focalfleet", "watch", "--json", "--domain", s.domain,

@@ -20,6 +20,8 @@ namespace {
 constexpr std::string_view kWays[] = {"docs/way_of_a_move.md", "docs/way_of_a_campaign.md",
                                       "docs/way_of_a_change.md"};
 
+constexpr std::string_view kFaultMatrix = "docs/fault-matrix.md";
+
 constexpr std::string_view kFolders[] = {"protocol/", "fleet/", "sim/",   "daemon/",
                                          "tests/",    "docs/",  "deploy/"};
 constexpr std::string_view kEndings[] = {".h", ".cc", ".c", ".md", ".py", ".toml", ".idl"};
@@ -206,6 +208,64 @@ Complaints PagesNameTestsThatExist(const Files& files) {
   return out;
 }
 
+// The cells of a row of a table, without blanks around them.
+std::vector<std::string> CellsOf(const std::string& line) {
+  std::vector<std::string> cells;
+  for (std::size_t begin = 1; begin < line.size();) {
+    const std::size_t end = std::min(line.find('|', begin), line.size());
+    const std::size_t first = line.find_first_not_of(' ', begin);
+    std::string cell = line.substr(std::min(first, end), end - std::min(first, end));
+    while (EndsWith(cell, " ")) cell.pop_back();
+    cells.push_back(std::move(cell));
+    begin = end + 1;
+  }
+  return cells;
+}
+
+// Texts in backquotes.
+std::vector<std::string> QuotesOf(const std::string& text) {
+  std::vector<std::string> quotes;
+  for (std::size_t open = text.find('`'); open != std::string::npos;) {
+    const std::size_t close = text.find('`', open + 1);
+    if (close == std::string::npos) break;
+    quotes.push_back(text.substr(open + 1, close - open - 1));
+    open = text.find('`', close + 1);
+  }
+  return quotes;
+}
+
+// A fault of the matrix has an id of its own, and may go over several rows. The last cells name its
+// tests: as Suite.Name, or by the path of a file.
+Complaints FaultsHaveTests(const Files& files) {
+  const std::set<std::string> tests = TestsOf(files);
+  Complaints out;
+  for (const File& page : files) {
+    if (page.path != kFaultMatrix) continue;
+    std::set<std::string> ids;
+    bool has_test = true;  // the last fault
+    const auto lines = Lines(page.text);
+    for (std::size_t i = 0; i <= lines.size(); ++i) {
+      const bool is_row = i < lines.size() && StartsWith(lines[i], "| ");
+      const auto cells = is_row ? CellsOf(lines[i]) : std::vector<std::string>{"id"};
+      if (!cells.front().empty()) {
+        if (!std::exchange(has_test, true))
+          out.push_back(At(page, i, "the fault above has no test"));
+        if (cells.front() == "id") continue;
+        has_test = false;
+        if (!ids.insert(cells.front()).second)
+          out.push_back(At(page, i, "there are two faults " + cells.front()));
+      }
+      if (cells.size() != 4) out.push_back(At(page, i, "a row has id, fault, response and tests"));
+      for (const std::string& test : QuotesOf(cells.back())) {
+        has_test = true;
+        if (tests.count(test) == 0 && !(StartsWith(test, "tests/") && Exists(files, test)))
+          out.push_back(At(page, i, "there is no test " + test));
+      }
+    }
+  }
+  return out;
+}
+
 // The targets of a page's links within the repository, from its root. A folder ends with `/`.
 std::vector<std::string> LinksOf(const File& page) {
   std::vector<std::string> links;
@@ -266,6 +326,30 @@ TEST(Tidy, WaysNameFunctionsThatExist) {
 
 TEST(Tidy, PagesAreTwoLinksAway) { ExpectNone(PagesAreTwoLinksAway(Tree())); }
 TEST(Tidy, PagesNameTestsThatExist) { ExpectNone(PagesNameTestsThatExist(Tree())); }
+
+TEST(Tidy, FaultsHaveTests) {
+  EXPECT_TRUE(Exists(Tree(), std::string(kFaultMatrix)));
+  ExpectNone(FaultsHaveTests(Tree()));
+}
+
+TEST(TidyRules, FaultsWithoutTestsAreCaught) {
+  const auto complaints = [](const std::string& rows) {
+    const std::string head = "| id | fault | response | tests |\n|---|---|---|---|\n";
+    return FaultsHaveTests({{"docs/fault-matrix.md", head + rows},
+                            {"tests/a_test.cc", "TEST(Bus, Stops) {}\n"},
+                            {"tests/can/sick-buses", ""}})
+        .size();
+  };
+  EXPECT_EQ(complaints("| C1 | off | restarted | `Bus.Stops`, `tests/can/sick-buses` |\n"), 0u);
+  EXPECT_EQ(complaints("| C1 | off | restarted | `Bus.Stop` |\n"), 1u);
+  EXPECT_EQ(complaints("| C1 | off | restarted | `tests/can/sick-bus` |\n"), 1u);
+  EXPECT_EQ(complaints("| C1 | off | restarted | `docs/fault-matrix.md` |\n"), 1u) << "no test";
+  EXPECT_EQ(complaints("| C1 | off | restarted | Bus.Stops |\n"), 1u) << "without backquotes";
+  EXPECT_EQ(complaints("| C1 | a | b | `Bus.Stops` |\n| C1 | a | b | `Bus.Stops` |\n"), 1u);
+  EXPECT_EQ(complaints("| C1 | a | b | |\n| | | | `Bus.Stops` |\n"), 0u);
+  EXPECT_EQ(complaints("| C1 | a | b | |\n\n| C2 | a | b | `Bus.Stops` |\n"), 1u);
+  EXPECT_EQ(complaints("| C1 | a | b |\n"), 2u);
+}
 
 TEST(TidyRules, PagesThatAreFarAreCaught) {
   const auto complaints = [](const std::string& index) {

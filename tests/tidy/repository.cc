@@ -28,7 +28,8 @@ Files Repository() {
   };
   for (const auto& top : fs::directory_iterator(root)) {
     const std::string name = top.path().filename().string();
-    if (top.is_regular_file()) read(top.path());
+    // In a worktree, .git is a file with a path of the machine.
+    if (top.is_regular_file() && name != ".git") read(top.path());
     if (!top.is_directory() || folders.count(name) == 0) continue;
     for (const auto& entry : fs::recursive_directory_iterator(top.path())) {
       const bool data = entry.path().string().find("/corpus/") != std::string::npos ||

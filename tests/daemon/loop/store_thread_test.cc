@@ -15,38 +15,44 @@ using ::testing::HasSubstr;
 class Disk {
  public:
   StoreThread::Sinks Sinks() {
-    return {
-        .commit = [this](std::span<const Row> rows, WallTime, std::size_t* refused) -> Status {
-          const std::lock_guard lock(mutex_);
-          ++attempts_;
-          if (broken_) return Fail(ErrorCode::kFull, "no space");
-          for (*refused = 0; *refused < rows.size(); ++*refused)
-            if (TextOf(rows[*refused]) == "poison")
-              return Fail(ErrorCode::kInvalid, "it contradicts what is stored");
-          std::string text = "commit";
-          for (const Row& row : rows) text += " " + TextOf(row);
-          Log(std::move(text));
-          return {};
-        },
-        .publish =
-            [this](const StatusBatch& status) {
+    return {.commit = [this](std::span<const Row> rows, WallTime, std::size_t* refused) -> Status {
               const std::lock_guard lock(mutex_);
-              const bool failing = status.fleet && status.fleet->store_failing;
-              if (!status.units.empty() || status.fleet)
-                Log("publish " + std::to_string(status.units.size()) + (failing ? " failing" : ""));
-              return false;
+              ++attempts_;
+              if (broken_) return Fail(ErrorCode::kFull, "no space");
+              for (*refused = 0; *refused < rows.size(); ++*refused)
+                if (TextOf(rows[*refused]) == "poison")
+                  return Fail(ErrorCode::kInvalid, "it contradicts what is stored");
+              std::string text = "commit";
+              for (const Row& row : rows) text += " " + TextOf(row);
+              Log(std::move(text));
+              return {};
             },
-        .alarm =
-            [this](const AlarmValue& alarm) {
-              const std::lock_guard lock(mutex_);
-              Log("alarm " + alarm.row.text);
-            },
-        .log_error = [](const std::string&) {},
-        .retry_period = std::chrono::milliseconds(5)};
+            .publish =
+                [this](StatusBatch* status) {
+                  const std::lock_guard lock(mutex_);
+                  const bool failing = status->fleet && status->fleet->store_failing;
+                  if (behind_) return false;
+                  if (!status->units.empty() || status->fleet)
+                    Log("publish " + std::to_string(status->units.size()) +
+                        (failing ? " failing" : ""));
+                  return true;
+                },
+            .alarm =
+                [this](const AlarmValue& alarm) {
+                  const std::lock_guard lock(mutex_);
+                  Log("alarm " + alarm.row.text);
+                },
+            .log_error = [](const std::string&) {},
+            .retry_period = std::chrono::milliseconds(5)};
   }
   void Break(bool broken) {
     const std::lock_guard lock(mutex_);
     broken_ = broken;
+  }
+  /// The publisher takes nothing more.
+  void HoldUp(bool behind) {
+    const std::lock_guard lock(mutex_);
+    behind_ = behind;
   }
   std::vector<std::string> log() {
     const std::lock_guard lock(mutex_);
@@ -67,6 +73,7 @@ class Disk {
 
   std::mutex mutex_;
   bool broken_ = false;
+  bool behind_ = false;
   int attempts_ = 0;
   std::vector<std::string> log_;
 };
@@ -232,6 +239,50 @@ TEST(StoreThread, RefusesStatusWhenItIsBehind) {
   EXPECT_LT(taken, 10);
   thread->Commit(99, Named("late"));
   ASSERT_TRUE(thread->Finish());
+}
+
+TEST(StoreThread, CommitsWhileThePublisherIsBehind) {
+  Disk disk;
+  disk.HoldUp(true);
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  StatusBatch status = UnitsAfter(0, 3);
+  ASSERT_TRUE(thread->Publish(&status));
+  thread->Commit(1, Named("one"));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == 1; }));
+  disk.HoldUp(false);
+  ASSERT_TRUE(thread->Finish());
+  EXPECT_EQ(disk.log(), (std::vector<std::string>{"commit one", "publish 3"}));
+}
+
+TEST(StoreThread, EndsWhereThePublisherHangs) {
+  Disk disk;
+  disk.HoldUp(true);
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  StatusBatch status = UnitsAfter(0, 3);
+  ASSERT_TRUE(thread->Publish(&status));
+  thread->Commit(1, Named("one"));
+  ASSERT_TRUE(thread->Finish());
+  EXPECT_EQ(disk.log(), (std::vector<std::string>{"commit one"}));
+}
+
+TEST(StoreThread, KeepsUpWhereNoRowsWait) {
+  Disk disk;
+  const auto progressed = EventSignal::Create().value();
+  StoreThread::Sinks sinks = disk.Sinks();
+  std::atomic<int> pieces{0};
+  sinks.upkeep = [&] {
+    const bool more = ++pieces < 3;
+    if (!more) progressed.Raise();
+    return more;
+  };
+  const auto thread = StoreThread::Create(std::move(sinks), &progressed).value();
+  EXPECT_TRUE(Await(progressed, [&] { return pieces == 3; }));
+  thread->Commit(1, Named("one"));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == 1; }));
+  ASSERT_TRUE(thread->Finish());
+  EXPECT_EQ(pieces, 3) << "an hour is not over";
 }
 
 TEST(StoreThread, ABrokenDiskAtTheEndIsSaid) {

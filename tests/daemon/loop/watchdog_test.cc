@@ -155,7 +155,7 @@ TEST(Watchdog, AStoreThreadAnswersWhileItSleepsAndNotWhileACommitBlocks) {
                              go_on.wait();
                              return {};
                            },
-                           .publish = [](const StatusBatch&) { return false; },
+                           .publish = [](StatusBatch*) { return true; },
                            .alarm = [](const AlarmValue&) {},
                            .log_error = [](const std::string&) {},
                            .log_info = [](const std::string&) {},

@@ -41,6 +41,32 @@ std::vector<CanFrame> ManyFrames(std::uint32_t count) {
   return frames;
 }
 
+/// As recvmmsg; the kernel marks each second packet as sent on this host, and each fourth as sent
+/// by this socket.
+int ReceiveMarked(int fd, mmsghdr* messages, unsigned count, int flags, timespec* timeout) {
+  const int got = ::recvmmsg(fd, messages, count, flags, timeout);
+  for (int k = 1; k < got; k += 2)
+    messages[k].msg_hdr.msg_flags |= MSG_DONTROUTE | (k % 4 == 3 ? MSG_CONFIRM : 0);
+  return got;
+}
+
+TEST(SocketFrames, FramesOfOtherProgramsOfThisHostAreCountedAndNotBelieved) {
+  const Pair pair;
+  for (const bool no_local : {true, false}) {
+    ASSERT_EQ(SendFrames(pair.a(), ManyFrames(8)).taken, 8u);
+    Aside aside;
+    aside.no_local = no_local;
+    aside.receive = ReceiveMarked;
+    std::vector<ReceivedFrame> heard;
+    PortCounters counters;
+    ReceiveFrames(pair.b(), kSource, &heard, &counters, &aside);
+    EXPECT_EQ(aside.confirmed, 2u);
+    EXPECT_EQ(counters.forged, no_local ? 2u : 0u);
+    ASSERT_EQ(heard.size(), no_local ? 4u : 6u);
+    EXPECT_EQ(heard[1].frame.id, no_local ? 2u : 1u);
+  }
+}
+
 TEST(SocketFrames, FrameSurvivesTheWay) {
   const CanFrame frame{.id = kCanIdMax, .length = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
   const can_frame raw = ToSocketFrame(frame);

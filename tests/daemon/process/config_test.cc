@@ -51,6 +51,7 @@ obstacles = "o.csv"
 clearance_mm = 0.25
 [store]
 path = "s.db"
+keep_days = 400
 [control]
 socket = "c.sock"
 [dds]
@@ -116,12 +117,13 @@ spread = "real"
   EXPECT_EQ(config->timing.silence_limit, Milliseconds(7));
   EXPECT_EQ(config->simulated.seed, 8u);
   EXPECT_FALSE(config->log.journal);
-  EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:17");
-  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:29");
+  EXPECT_EQ(config->store.keep_days, 400u);
+  EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:18");
+  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:30");
   EXPECT_EQ(config->sync.chip, "/dev/gpiochip3");
   EXPECT_EQ(config->sync.line, 9u);
   EXPECT_TRUE(config->sync.active_low);
-  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:31");
+  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:32");
   EXPECT_TRUE(config->timing.sync_line);
   EXPECT_EQ(config->timing.sync_lead, Milliseconds(9));
 }

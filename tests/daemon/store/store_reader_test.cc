@@ -256,11 +256,75 @@ TEST_F(StoreTest, PruneTakesOldHistoryAndNoNextIds) {
           OpenAlarmRow{.id = 9, .state = OpenAlarmRow::State::kOver, .last_unix_ns = kEight.ns}},
       kEight));
   EXPECT_EQ(store->Prune(kEight, 100), 0u);
-  EXPECT_EQ(store->Prune(kNine, 100), 4u) << "an alarm that lasts stays";
+  EXPECT_EQ(store->Prune(kNine, 100), 3u) << "an alarm that lasts and the newest one stay";
   const auto fleet = store->Load();
   EXPECT_EQ(fleet->open_intents.size(), 1u);
   EXPECT_EQ(fleet->next_configuration, 9u);
   EXPECT_EQ(fleet->next_alarm, 10u);
+}
+
+TEST_F(StoreTest, PruneTakesNoMoreRowsAtOnceThanAsked) {
+  auto store = OpenStore();
+  for (std::uint16_t move = 1; move <= 5; ++move)
+    test::ExpectDone(store->Commit(
+        std::vector<Row>{Intent(1, 1, move, {0, 0}, {1, 1}),
+                         IntentEndRow{{1}, {move}, IntentEnd::kArrived},
+                         EnableRow{{1}, move % 2 == 0, "by turns"},
+                         ParameterRow{{1}, Axis::kPhi, Parameter::kRepeat, move, Origin::kTuning}},
+        kEight));
+  EXPECT_EQ(store->Prune(kNine, 2), 6u) << "two motions, two changes of the unit, of a parameter";
+  EXPECT_EQ(store->Prune(kNine, 2), 6u);
+  EXPECT_EQ(store->Prune(kNine, 2), 3u);
+  EXPECT_EQ(store->Prune(kNine, 2), 0u);
+  EXPECT_EQ(store->Load()->parameters.size(), 1u);
+  EXPECT_EQ(store->Load()->units.size(), 1u);
+}
+
+TEST_F(StoreTest, PruneKeepsWhatSaysForWhichUnitsAModelHolds) {
+  auto store = OpenStore();
+  const auto homed = [&](std::uint16_t move) {
+    return std::vector<Row>{Intent(12, 7, move, {0, 0}, {1, 1}),
+                            IntentEndRow{{7}, {move}, IntentEnd::kHomed}};
+  };
+  test::ExpectDone(store->Commit(std::vector<Row>{BindingRow{{12}, {7}}}, {1}));
+  test::ExpectDone(store->Commit(homed(1), kEight));
+  test::ExpectDone(store->Commit(homed(2), kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{ModelRow{.entry = 1}}, {2}));
+  test::ExpectDone(store->Commit(
+      std::vector<Row>{Vector(7, Witness::kReported, 1, 1, 3, Origin::kOperator)}, kEight));
+  EXPECT_EQ(store->Prune(kNine, 100), 2u) << "the first homing, the binding before all models";
+  EXPECT_EQ(OpenReader()->CountedAnewSince({2}), std::vector<UnitId>{{12}});
+  EXPECT_EQ(store->Prune(kNine, 100), 0u);
+}
+
+TEST(OldBefore, AStepOfTheWallClockMakesNothingOld) {
+  constexpr std::int64_t kDayNs = 86'400'000'000'000;
+  const HistoryAge age{
+      .now = kEight, .newest = {kEight.ns - kDayNs}, .open_s = 86'400, .keep_days = 30};
+  EXPECT_EQ(OldBefore(age).ns, kEight.ns - 30 * kDayNs);
+  HistoryAge stepped = age;
+  stepped.now = {kEight.ns + 36'500 * kDayNs};
+  EXPECT_EQ(OldBefore(stepped).ns, kEight.ns - 30 * kDayNs) << "a century ahead";
+  stepped.now = {kEight.ns - 100 * kDayNs};
+  EXPECT_EQ(OldBefore(stepped).ns, kEight.ns - 130 * kDayNs) << "back: less is old";
+  HistoryAge kept = age;
+  kept.keep_days = 0;
+  EXPECT_EQ(OldBefore(kept).ns, 0);
+  kept = age;
+  kept.newest = {0};
+  EXPECT_EQ(OldBefore(kept).ns, 0) << "there is no history";
+}
+
+TEST_F(StoreTest, TheNewestTimeIsThatOfTheHistory) {
+  auto store = OpenStore();
+  EXPECT_EQ(store->Newest()->ns, 0);
+  test::ExpectDone(
+      store->Commit(std::vector<Row>{AlarmRow{1, Severity::kInfo, {}, {}, ""}}, kEight));
+  EXPECT_EQ(store->Newest()->ns, kEight.ns);
+  test::ExpectDone(store->Commit(std::vector<Row>{Intent(1, 1, 1, {0, 0}, {1, 1})}, kEight));
+  test::ExpectDone(
+      store->Commit(std::vector<Row>{IntentEndRow{{1}, {1}, IntentEnd::kArrived}}, kNine));
+  EXPECT_EQ(store->Newest()->ns, kNine.ns);
 }
 
 TEST_F(StoreTest, GarbageInHistoryIsAnErrorToo) {

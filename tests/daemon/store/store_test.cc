@@ -241,7 +241,7 @@ INSTANTIATE_TEST_SUITE_P(
         Garbage{"UPDATE tuning SET mode = 3", "mode is 3"},
         Garbage{"UPDATE tuning SET origin = 9", "origin is 9"},
         Garbage{"UPDATE meta SET value = 65536 WHERE key = 'next_move'", "value is 65536"},
-        Garbage{"INSERT INTO meta VALUES('next_mood', 1)", "next_mood: nobody reads"}));
+        Garbage{"INSERT INTO meta(key, value) VALUES('next_mood', 1)", "next_mood: nobody reads"}));
 
 TEST_F(StoreTest, AnEmptyBatchIsNoTransaction) {
   auto store = OpenStore();

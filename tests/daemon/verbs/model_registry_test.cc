@@ -67,6 +67,8 @@ TEST_F(ModelRegistryTest, ABadFileChangesNothing) {
   EXPECT_THAT(with("arm_phi_mm = ", "arm_phi_mm = -"), HasSubstr("bad.toml:"));
   EXPECT_THAT(with("[[unit]]", "[[unit"), HasSubstr("bad.toml:"));
   EXPECT_THAT(with("explained", "insufficient"), HasSubstr("insufficient"));
+  for (const char* const id : {"1e300", "-1", "0.5", "4294967296"})
+    EXPECT_THAT(with("unit_id = 1", std::string("unit_id = ") + id), HasSubstr("a unit's number"));
   EXPECT_FALSE(registry.Load("", "empty.toml"));
   EXPECT_FALSE(registry.Load(Text("one"), "again.toml"));
   EXPECT_EQ(registry.Show(10), before);

@@ -1,0 +1,118 @@
+// A wrong bit in the store's file is noticed: a disk may return another bit than was written.
+#include <fstream>
+#include <iterator>
+
+#include "daemon/store/schema.h"
+#include "daemon/store/store.h"
+#include "protocol/base/rng.h"
+#include "tests/daemon/store/store_fixture.h"
+#include "tests/support/seed.h"
+
+namespace focalfleet {
+namespace {
+
+using test::Intent;
+using test::StoreTest;
+using test::Vector;
+
+std::string Bytes(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Expects the same facts of where units stand, whether they move and how.
+void ExpectSame(const StoredFleet& read, const StoredFleet& written, const std::string& what) {
+  EXPECT_EQ(read.units, written.units) << what;
+  EXPECT_EQ(read.vectors, written.vectors) << what;
+  EXPECT_EQ(read.open_intents, written.open_intents) << what;
+  EXPECT_EQ(read.parameters, written.parameters) << what;
+  EXPECT_EQ(read.tunings, written.tunings) << what;
+  EXPECT_EQ(read.next_move, written.next_move) << what;
+  EXPECT_EQ(read.next_configuration, written.next_configuration) << what;
+}
+
+TEST_F(StoreTest, AWrongBitChangesNothingThatIsLoaded) {
+  constexpr std::uint32_t kSerials = 40;
+  std::vector<Row> rows = test::Batch(9, kSerials);
+  for (std::uint32_t unit = 1; unit <= kSerials; ++unit) {
+    rows.emplace_back(BindingRow{{unit}, {unit}});
+    if (unit % 3 == 0) rows.emplace_back(EnableRow{{unit}, false, "arm bent"});
+    if (unit % 2 == 0) rows.emplace_back(Intent(unit, unit, 10, {9, -9}, {70, 80}));
+    // An interval repeats nothing by which a wrong bit shows.
+    VectorRow interval = Vector(unit, Witness::kInterval, 300, 400);
+    for (AxisKnowledge& axis : interval.knowledge) axis.high += 70'000;
+    rows.emplace_back(interval);
+  }
+  rows.emplace_back(ConfigurationRow{.id = 3, .source = "night.csv"});
+  test::ExpectDone(OpenStore()->Commit(rows, test::kEight));
+  const std::string good = Bytes(Path());
+  ASSERT_FALSE(std::filesystem::exists(Path() + "-wal"));
+  const StoredFleet written = *OpenStore()->Load();
+  const std::uint64_t seed = test::TestSeed(5);
+  FOCALFLEET_TRACE_SEED(seed);
+  Rng rng(seed);
+  int refused = 0;
+  for (int round = 0; round < 500; ++round) {
+    std::uint64_t bit = rng.Below(8 * good.size());
+    while (good[bit / 8] == 0) bit = rng.Below(8 * good.size());  // free space for the most part
+    std::string wrong = good;
+    wrong[bit / 8] = static_cast<char>(wrong[bit / 8] ^ static_cast<char>(1 << bit % 8));
+    const std::string copy = folder_ / "copy.db";
+    for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(copy + suffix);
+    std::ofstream(copy, std::ios::binary) << wrong;
+    auto store = Store::Open(copy);
+    const auto read = store ? (*store)->Load() : tl::unexpected<Error>(store.error());
+    if (!read) ++refused;
+    if (read) ExpectSame(*read, written, "bit " + std::to_string(bit));
+    if (HasFailure()) return;
+  }
+  // Much of a file is free space. Without checksums a sixth of the bits is noticed.
+  EXPECT_GT(refused, 30);
+}
+
+TEST_F(StoreTest, AStoreOfVersionNineGetsChecksumsOfItsRows) {
+  using store_internal::Connection;
+  using store_internal::Migrations;
+  {
+    auto connection = Connection::Open(Path(), Connection::Mode::kWrite, nullptr, 0);
+    ASSERT_TRUE(connection);
+    test::ExpectDone(store_internal::Migrate(**connection, 0, Migrations().first(9)));
+    test::ExpectDone(
+        (*connection)
+            ->Execute("INSERT INTO unit VALUES(12, 7, 0, 'arm bent', 5); INSERT INTO meta "
+                      "VALUES('next_move', 4);"
+                      "INSERT INTO axis_state VALUES(7, 0, 3, 5, 5, 5, 0, 96, 3, 4, 5, 0);"
+                      "INSERT INTO axis_state VALUES(7, 1, 1, 5, 6, NULL, NULL, 96, 3, 4, 5, 0);"
+                      "INSERT INTO parameter VALUES(7, 1, 1, 37, 1, 5);"
+                      "INSERT INTO intent VALUES(1, 1, 12, 7, 3, 0, 0, 1, 1, 0, 1, 0, 1, 5, NULL, "
+                      "NULL, NULL, "
+                      "NULL, NULL, NULL, NULL, NULL)"));
+  }
+  const auto fleet = OpenStore()->Load();
+  ASSERT_TRUE(fleet) << fleet.error().text;
+  EXPECT_EQ(fleet->units.size(), 1u);
+  EXPECT_EQ(fleet->vectors.size(), 1u);
+  EXPECT_EQ(fleet->parameters.size(), 1u);
+  EXPECT_EQ(fleet->open_intents.size(), 1u);
+  EXPECT_EQ(fleet->next_move.value, 4u);
+  Sql("UPDATE unit SET enabled = 1");
+  EXPECT_EQ(test::ErrorOf(OpenStore()->Load()).code, ErrorCode::kInvalid);
+}
+
+TEST_F(StoreTest, RowsThatChangeInPartKeepTheirChecksums) {
+  auto store = OpenStore();
+  test::ExpectDone(store->Commit(
+      std::vector<Row>{BindingRow{{1}, {11}}, EnableRow{{1}, false, "arm bent"},
+                       BindingRow{{2}, {11}}, BindingRow{{1}, {12}}, EnableRow{{1}, true, ""},
+                       Intent(1, 12, 3, {0, 0}, {1, 1}), Intent(1, 12, 3, {0, 0}, {2, 2}),
+                       ParameterRow{{12}, Axis::kPhi, Parameter::kRepeat, 37, Origin::kTuning},
+                       ParameterRow{{12}, Axis::kPhi, Parameter::kRepeat, 38, Origin::kOperator}},
+      test::kEight));
+  const auto fleet = store->Load();
+  ASSERT_TRUE(fleet) << fleet.error().text;
+  EXPECT_EQ(fleet->open_intents.size(), 1u);
+  EXPECT_EQ(fleet->open_intents[0].to, (Pose{2, 2}));
+}
+
+}  // namespace
+}  // namespace focalfleet
