@@ -86,7 +86,10 @@ Page& Page::Plot(const Svg& svg, std::string_view caption) {
 std::string Page::Html() const {
   std::string out =
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n";
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
+      // Texts of a campaign's files are on the page. It runs no script and fetches nothing.
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
+      "style-src 'unsafe-inline'\"/>\n";
   out.append("<title>").append(title_).append("</title>\n<style>\n");
   out.append(kPageStyle).append(PlotStyle()).append("</style>\n</head>\n<body>\n");
   out.append("<h1>").append(title_).append("</h1>\n");

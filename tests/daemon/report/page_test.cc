@@ -51,6 +51,8 @@ TEST(Page, NeedsNothingElse) {
   for (const char* foreign : {"<script", "<link", "<img", "@import", "url(", "http:", "https:"}) {
     EXPECT_THAT(html, Not(HasSubstr(foreign)));
   }
+  // Nor may a text that it shows make a browser fetch or run anything.
+  EXPECT_THAT(html, HasSubstr("default-src 'none'; style-src 'unsafe-inline'"));
 }
 
 TEST(Page, IsTheSameForTheSameCalls) { EXPECT_EQ(Example().Html(), Example().Html()); }
