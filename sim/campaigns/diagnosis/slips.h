@@ -2,7 +2,8 @@
 // unit is homed. Each is a hypothesis with a fixed size, so that its likelihood ratio needs no fit
 // of an amplitude: chance reaches a ratio of e^L with probability e^-L at most. A slip is taken
 // where the ratio is larger than the number of slips that there could have been, by the family-wise
-// rate.
+// rate. The narrowest window of rows that shows a slip tells it, with the unit's geometry free in
+// the window.
 // Source: Ville's inequality, as in Royall, Statistical Evidence, chapter 1.
 #pragma once
 
