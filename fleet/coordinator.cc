@@ -59,6 +59,7 @@ class Coordinator::Impl {
   void End(HostInstant now, Effects* effects) {
     BeginStep(now, ledger_.committed_through(), ledger_.store_failing(), effects);
     executor_.GiveUp();
+    ledger_.NoteAllFolded();
     ledger_.CloseBatch();
   }
 

@@ -12,6 +12,7 @@ ExitCode AskForEach(const Context& context, const std::vector<std::uint32_t>& un
   const bool single = units.size() == 1;
   Json served = Json::array();
   Json refused = Json::array();
+  const auto so_far = [&] { return Json{{"units", served}, {"refused", refused}}; };
   std::optional<ExitCode> worst;  // of the first that was refused
   for (const std::uint32_t id : units) {
     Json args = question.args;
@@ -21,6 +22,7 @@ ExitCode AskForEach(const Context& context, const std::vector<std::uint32_t>& un
         {.verb = question.verb, .args = std::move(args), .long_lasting = question.long_lasting});
     if (!answer) {
       const Failure& failure = answer.error();
+      if (!failure.answered && !single && context.json) PrintJson(so_far());
       if (single || !failure.answered) return Report(context, failure);
       // Many texts begin with their unit; all others need it here.
       const std::string name = fmt::format("unit {}", id);
@@ -34,8 +36,7 @@ ExitCode AskForEach(const Context& context, const std::vector<std::uint32_t>& un
     if (!single) (*answer)["unit_id"] = id;
     served.push_back(std::move(*answer));
   }
-  if (context.json)
-    PrintJson(single ? served.front() : Json{{"units", served}, {"refused", refused}});
+  if (context.json) PrintJson(single ? served.front() : so_far());
   if (!worst) return ExitCode::kOk;
   if (single) return *worst;
   if (!refused.empty())

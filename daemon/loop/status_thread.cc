@@ -34,7 +34,8 @@ StatusThread::~StatusThread() {
 bool StatusThread::Publish(StatusBatch* status) {
   if (!batches_.Push(status)) {
     refused_ = true;
-    return false;
+    // The thread may have emptied the queue before it could know of the refusal.
+    if (!batches_.Push(status)) return false;
   }
   wake_.Raise();
   return true;

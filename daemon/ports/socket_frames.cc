@@ -117,10 +117,6 @@ void Sort(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFrame>* 
     ++aside->confirmed;
     return;
   }
-  if (packet.local && aside != nullptr && aside->no_local) {
-    ++counters->forged;
-    return;
-  }
   if (packet.size == sizeof(canfd_frame) && aside != nullptr && aside->groups)
     return TakeApart(packet, stamp, out, counters, *aside);
   const bool whole = packet.size == sizeof(can_frame);
@@ -132,7 +128,13 @@ void Sort(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFrame>* 
       ++counters->rejected;
     return;
   }
-  if (aside != nullptr && aside->only_units && !IsFromUnit(*frame)) return;  // from another host
+  const bool from_unit = IsFromUnit(*frame);
+  if (aside != nullptr && aside->only_units && !from_unit) return;  // from another host
+  // Hosts may share a machine: their frames are heard. No unit is a program of this one.
+  if (from_unit && packet.local && aside != nullptr && aside->no_local) {
+    ++counters->forged;
+    return;
+  }
   out->push_back({stamp.bus, StampOf(packet, stamp, aside), *frame});
 }
 

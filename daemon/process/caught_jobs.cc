@@ -1,10 +1,12 @@
 #include "daemon/process/caught_jobs.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
 #include <exception>
 #include <string>
+#include <utility>
 
 #include "daemon/clock/wall_time.h"
 #include "daemon/hall/measure.h"
@@ -13,10 +15,9 @@
 namespace focalfleet {
 namespace {
 
-/// Limit of the time of one plan. The densest plate of 5000 units takes minutes. With half of the
-/// limit a busy host might not finish such a plan. Twice as much would hold an operator up for
-/// longer after a search that finds no end.
-constexpr std::chrono::minutes kPlanWithin{15};
+bool IsGivenUp(const PlannerWork& work) {
+  return work.given_up != nullptr && work.given_up->load();
+}
 
 template <class Job, class Failed>
 auto Caught(const Job& job, const Failed& failed) {
@@ -41,18 +42,30 @@ void Count(const ExposureDone& done, WorkCounters* work) {
 }  // namespace
 
 PlanDone PlanCaught(const PlannerWork& work, const Layout& layout, const std::atomic<bool>& ending,
-                    const std::function<void()>& alive) {
+                    const std::function<void()>& alive, std::chrono::nanoseconds within) {
   const auto begun = std::chrono::steady_clock::now();
-  const auto abandoned = [&ending, &work, &alive, begun] {
+  bool is_late = false;
+  const auto abandoned = [&] {
     alive();  // a plan shows that it proceeds by asking whether it is still wanted
-    return ending.load() || (work.given_up != nullptr && work.given_up->load()) ||
-           std::chrono::steady_clock::now() - begun > kPlanWithin;
+    if (ending.load() || IsGivenUp(work)) return true;
+    is_late = std::chrono::steady_clock::now() - begun > within;
+    return is_late;
   };
-  return Caught(
-      [&] { return RunPlanJob(work.job, layout, work.drives, abandoned); },
-      [&](const std::string& why) {
-        return PlanFailed(work.job, {ErrorCode::kUnavailable, "the planner failed: " + why});
-      });
+  const auto failed = [&work](ErrorCode code, std::string why) {
+    return PlanFailed(work.job, {code, std::move(why)});
+  };
+  PlanDone done = Caught([&] { return RunPlanJob(work.job, layout, work.drives, abandoned); },
+                         [&](const std::string& why) {
+                           return failed(ErrorCode::kUnavailable, "the planner failed: " + why);
+                         });
+  if (done.plan) return done;
+  if (IsGivenUp(work))
+    return failed(ErrorCode::kRefused, "a configuration was commanded and is planned first");
+  if (is_late)
+    return failed(ErrorCode::kUnavailable,
+                  fmt::format("the planner found no plan within {} minutes",
+                              std::chrono::duration_cast<std::chrono::minutes>(within).count()));
+  return done;
 }
 
 ExposureDone MeasureCaught(const CameraWork& work, const MeasuringParts& parts,

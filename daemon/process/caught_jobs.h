@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 
 #include "daemon/camera/camera_work.h"
@@ -13,9 +14,15 @@
 
 namespace focalfleet {
 
+/// Limit of the time of one plan. The densest plate of 5000 units takes minutes. With half of the
+/// limit a busy host might not finish such a plan. Twice as much would hold an operator up for
+/// longer after a search that finds no end.
+inline constexpr std::chrono::minutes kPlanWithin{15};
+
 /// The plan, or the reason why there is none. `alive` is called while the search proceeds.
 PlanDone PlanCaught(const PlannerWork& work, const Layout& layout, const std::atomic<bool>& ending,
-                    const std::function<void()>& alive);
+                    const std::function<void()>& alive,
+                    std::chrono::nanoseconds within = kPlanWithin);
 
 /// The parts that measure; either may be missing.
 struct MeasuringParts {

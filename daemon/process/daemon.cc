@@ -436,9 +436,10 @@ Status Daemon::End() {
       std::vector<BoundedEnd::Part>{{"the buses", [this] { lines_.reset(); }},
                                     {"the planner", [this] { planner_.reset(); }},
                                     {"the camera", [this] { measuring_.thread.reset(); }},
-                                    {"the metrics", [this] { metrics_.endpoint.reset(); }}});
+                                    {"the metrics", [this] { metrics_.endpoint.reset(); }},
+                                    // A question that runs is cut short.
+                                    {"the reader", [this] { stored_.reader.reset(); }}});
   const Status stored = stored_.writer->Finish();
-  stored_.reader.reset();  // soon: a question that runs is cut short
   handler_->Close();
   status_.ending =
       std::make_unique<BoundedEnd>(std::vector<BoundedEnd::Part>{{"the status", [this] {

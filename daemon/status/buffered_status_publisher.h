@@ -1,4 +1,4 @@
-// The publisher of status to DDS, on the store's thread. Values that DDS does not take now, because
+// The publisher of status to DDS, on the status thread. Values that DDS does not take now, because
 // a reader lags, are kept and offered again, newest values only. While the domain cannot be joined,
 // all values are kept. A reader that joins later receives the whole state at once, and the newest
 // alarms.

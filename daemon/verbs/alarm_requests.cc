@@ -134,6 +134,10 @@ Result<StoreReading> AskAlarms(const ControlRequest& request, const AlarmRegiste
     });
     if (all) {
       FOCALFLEET_TRY_ASSIGN(auto earlier, store->EarlierAlarms(earlier_most, period));
+      // The store is read a little later than the register: an alarm that ended meanwhile is once.
+      std::erase_if(earlier, [&](const OpenAlarmRow& row) {
+        return std::ranges::find(rows, row.id, &OpenAlarmRow::id) != rows.end();
+      });
       rows.insert(rows.begin(), std::make_move_iterator(earlier.rbegin()),
                   std::make_move_iterator(earlier.rend()));
       std::ranges::stable_sort(rows, {}, &OpenAlarmRow::id);

@@ -324,10 +324,7 @@ void RequestHandler::PreviewDone(const FleetView& view, const PlanDone& done) {
   if (!dry_run_) return;
   const DryRun run = *std::exchange(dry_run_, std::nullopt);
   if (done.plan) return Answer(run.pending, PreviewJson(view, done, run.targeted, run.refused));
-  const bool given_up = done.plan.error().code == ErrorCode::kUnavailable;
-  Answer(run.pending,
-         given_up ? Fail(ErrorCode::kRefused, "a configuration was commanded and is planned first")
-                  : tl::unexpected<Error>(done.plan.error()));
+  Answer(run.pending, tl::unexpected<Error>(done.plan.error()));
 }
 
 void RequestHandler::RefusePreview() {

@@ -1,7 +1,7 @@
 // The requests of the control socket. A request becomes a command of the coordinator, or is
-// answered at once. Replies of the coordinator become answers, and clients that wait for a
-// configuration receive its progress. All of it runs on the core thread, so every answer is about
-// one instant.
+// answered at once, by one instant of the core thread. Questions about the past are answered by the
+// reader's thread (store_questions.h). Replies of the coordinator become answers, and clients that
+// wait for a configuration receive its progress.
 //
 // A stop is handled before everything else that was read in a turn, even from behind other lines of
 // its client. A turn with a stop handles no other line, so that the frames of the stop are on the

@@ -18,6 +18,11 @@ constexpr std::uint32_t kNotedSingly = 3;
 /// flap of a slow one; with twice as much, operators would see it later than they look.
 constexpr DurationNs kFoldedLasts = Seconds(2);
 
+bool HasLife(AlarmName name) {
+  const AlarmLife life = KindOf(name).life;
+  return life == AlarmLife::kCondition || life == AlarmLife::kOfHost;
+}
+
 MoveId MoveAfter(MoveId move, std::uint32_t count) {
   constexpr std::uint32_t kIds = 65'535;  // 0 is none
   return {static_cast<std::uint16_t>((move.value + count - 1) % kIds + 1)};
@@ -79,20 +84,22 @@ void Ledger::Raise(AlarmName name, std::optional<PositionerIndex> unit, std::opt
                    std::string text) {
   Condition alarm{name, {}, bus};
   if (unit) alarm.unit = layout_.unit(*unit).id;
-  const AlarmLife life = KindOf(name).life;
-  if (life == AlarmLife::kCondition || life == AlarmLife::kOfHost) {
-    conditions_.insert(alarm);
+  bool lasted = false;
+  if (HasLife(name)) {
+    lasted = !conditions_.insert(alarm).second;
     unconfirmed_.erase(alarm);
   }
-  const auto [at, is_first] = repeats_.try_emplace(alarm, Repeats{step_.now, step_.now});
+  const auto [at, is_first] = repeats_.try_emplace(alarm, Repeats{step_.now, step_.now, step_.now});
   Repeats& repeats = at->second;
   repeats.last = step_.now;
+  if (!lasted) repeats.begun = step_.now;
   if (repeats.noted < kNotedSingly) {
     ++repeats.noted;
     fold_at_ = std::min(fold_at_, repeats.since + kFoldWindow);
     NoteAlarm(alarm, std::move(text), 1);
     return;
   }
+  repeats.alike = repeats.folded == 0 || (repeats.alike && repeats.text == text);
   ++repeats.folded;
   repeats.text = std::move(text);
   fold_at_ = std::min(fold_at_, step_.now + kFoldedLasts);
@@ -108,6 +115,21 @@ void Ledger::NoteAlarm(const Condition& alarm, std::string text, std::uint32_t t
                 .times = times});
 }
 
+void Ledger::NoteRepeats(const Condition& alarm, const Repeats& repeats) {
+  const auto seconds_since = [this](HostInstant at) {
+    return std::to_string((step_.now - at).ns / Seconds(1).ns);
+  };
+  const bool is_old = step_.now - repeats.last >= Seconds(1);
+  NoteAlarm(alarm,
+            repeats.text + " (" + std::to_string(repeats.folded) +
+                (repeats.alike ? " times more in " : " of its kind in ") +
+                seconds_since(repeats.since) + " s" +
+                (is_old ? ", the last " + seconds_since(repeats.last) + " s ago)" : ")"),
+            repeats.folded);
+  if (HasLife(alarm.name) && !conditions_.contains(alarm))
+    Note(AlarmEndRow{alarm.name, alarm.unit, alarm.bus});
+}
+
 // The window after one with folded alarms has no single ones: what goes on stays one line a window.
 void Ledger::NoteFolded() {
   if (step_.now < fold_at_) return;
@@ -116,18 +138,10 @@ void Ledger::NoteFolded() {
     const Condition& alarm = at->first;
     Repeats& repeats = at->second;
     const bool window_over = step_.now - repeats.since >= kFoldWindow;
-    const bool has_life = KindOf(alarm.name).life == AlarmLife::kCondition ||
-                          KindOf(alarm.name).life == AlarmLife::kOfHost;
-    const bool lasts = has_life && conditions_.contains(alarm);
-    const bool due =
-        repeats.folded > 0 && (window_over || (lasts && step_.now - repeats.last >= kFoldedLasts));
-    if (due) {
-      const auto seconds = (step_.now - repeats.since).ns / 1'000'000'000;
-      NoteAlarm(alarm,
-                repeats.text + " (" + std::to_string(repeats.folded) + " times more in " +
-                    std::to_string(seconds) + " s)",
-                repeats.folded);
-      if (has_life && !lasts) Note(AlarmEndRow{alarm.name, alarm.unit, alarm.bus});
+    const bool lasts = HasLife(alarm.name) && conditions_.contains(alarm);
+    const bool lasts_long = lasts && step_.now - repeats.begun >= kFoldedLasts;
+    if (repeats.folded > 0 && (window_over || lasts_long)) {
+      NoteRepeats(alarm, repeats);
       if (window_over) repeats.since = step_.now;
       repeats.folded = 0;
     } else if (window_over) {
@@ -135,8 +149,15 @@ void Ledger::NoteFolded() {
       continue;
     }
     fold_at_ = std::min(fold_at_, repeats.since + kFoldWindow);
-    if (repeats.folded > 0 && lasts) fold_at_ = std::min(fold_at_, repeats.last + kFoldedLasts);
+    if (repeats.folded > 0 && lasts) fold_at_ = std::min(fold_at_, repeats.begun + kFoldedLasts);
     ++at;
+  }
+}
+
+void Ledger::NoteAllFolded() {
+  for (auto& [alarm, repeats] : repeats_) {
+    if (repeats.folded > 0) NoteRepeats(alarm, repeats);
+    repeats.folded = 0;
   }
 }
 

@@ -62,6 +62,8 @@ class Ledger {
   std::uint64_t TakeExposureId() { return next_exposure_++; }
 
   void BeginStep(std::uint64_t committed_through, bool store_failing);
+  /// Notes all folded alarms, since no later step does.
+  void NoteAllFolded();
   /// Sends the replies whose rows are durable, or never will be.
   void SendReplies();
   /// Numbers the batch of this step's rows, if there are any.
@@ -90,13 +92,16 @@ class Ledger {
   /// Equal alarms of the last while.
   struct Repeats {
     HostInstant since;  // the first of the window
+    HostInstant begun;  // the newest that was no repetition of a condition that lasts
     HostInstant last;   // the newest
     std::uint32_t noted = 0;
     std::uint32_t folded = 0;
     std::string text = {};  // of the newest that was folded
+    bool alike = true;      // whether all that were folded have that text
   };
 
   void NoteAlarm(const Condition& alarm, std::string text, std::uint32_t times);
+  void NoteRepeats(const Condition& alarm, const Repeats& repeats);
   void NoteFolded();
   void ReserveMoves();
   void EndUnconfirmed();

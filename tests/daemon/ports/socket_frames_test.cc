@@ -34,10 +34,10 @@ class Pair {
   std::array<int, 2> fds_{-1, -1};
 };
 
-std::vector<CanFrame> ManyFrames(std::uint32_t count) {
+std::vector<CanFrame> ManyFrames(std::uint32_t count, std::uint32_t first_id = 0) {
   std::vector<CanFrame> frames(count);
   for (std::uint32_t i = 0; i < count; ++i)
-    frames[i] = {.id = i, .length = 4, .data = {1, 2, 3, 4}};
+    frames[i] = {.id = first_id + i, .length = 4, .data = {1, 2, 3, 4}};
   return frames;
 }
 
@@ -52,8 +52,9 @@ int ReceiveMarked(int fd, mmsghdr* messages, unsigned count, int flags, timespec
 
 TEST(SocketFrames, FramesOfOtherProgramsOfThisHostAreCountedAndNotBelieved) {
   const Pair pair;
+  constexpr std::uint32_t kFromUnit = 1u << 19;
   for (const bool no_local : {true, false}) {
-    ASSERT_EQ(SendFrames(pair.a(), ManyFrames(8)).taken, 8u);
+    ASSERT_EQ(SendFrames(pair.a(), ManyFrames(8, kFromUnit)).taken, 8u);
     Aside aside;
     aside.no_local = no_local;
     aside.receive = ReceiveMarked;
@@ -63,8 +64,21 @@ TEST(SocketFrames, FramesOfOtherProgramsOfThisHostAreCountedAndNotBelieved) {
     EXPECT_EQ(aside.confirmed, 2u);
     EXPECT_EQ(counters.forged, no_local ? 2u : 0u);
     ASSERT_EQ(heard.size(), no_local ? 4u : 6u);
-    EXPECT_EQ(heard[1].frame.id, no_local ? 2u : 1u);
+    EXPECT_EQ(heard[1].frame.id, kFromUnit + (no_local ? 2u : 1u));
   }
+}
+
+TEST(SocketFrames, AStopThatAnotherProgramOfThisHostSendsIsHeard) {
+  const Pair pair;
+  ASSERT_EQ(SendFrames(pair.a(), ManyFrames(2)).taken, 2u);
+  Aside aside;
+  aside.no_local = true;
+  aside.receive = ReceiveMarked;
+  std::vector<ReceivedFrame> heard;
+  PortCounters counters;
+  ReceiveFrames(pair.b(), kSource, &heard, &counters, &aside);
+  EXPECT_EQ(heard.size(), 2u);
+  EXPECT_EQ(counters.forged, 0u);
 }
 
 TEST(SocketFrames, FrameSurvivesTheWay) {

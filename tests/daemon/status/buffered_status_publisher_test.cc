@@ -75,7 +75,7 @@ TEST(BufferedStatusPublisher, PublishesTheWholeStateOnceItCanJoin) {
            seen.alarms.size() == StatusPublisher::kAlarmsKept && seen.fleet && seen.configuration;
   };
   while (!enough() && std::chrono::steady_clock::now() < until) {
-    publisher.Publish(StatusBatch{});  // as the store's thread does repeatedly
+    publisher.Publish(StatusBatch{});  // as the status thread does repeatedly
     ASSERT_TRUE(reader->Wait(std::chrono::milliseconds(10)));
     ASSERT_TRUE(reader->Take(&update));
     for (const auto& unit : update.units) seen.units[unit.unit.value] = unit;

@@ -261,8 +261,8 @@ TEST_F(RequestHandlerTest, ADryRunIsPlannedAndChangesNothing) {
   TurnUntilQuiet();
   ASSERT_TRUE(handler_.TakePreview());
   handler_.PreviewDone(fleet_.View(), {.purpose = PlanPurpose::kPreview,
-                                       .plan = Fail(ErrorCode::kUnavailable, "given up")});
-  EXPECT_THAT(clients_[0]->Receive(), HasSubstr("is planned first"));
+                                       .plan = Fail(ErrorCode::kRefused, "given up")});
+  EXPECT_THAT(clients_[0]->Receive(), HasSubstr("given up"));
 }
 
 TEST_F(RequestHandlerTest, ADryRunShowsThatItIsPlanned) {
