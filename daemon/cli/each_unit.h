@@ -22,10 +22,10 @@ struct UnitQuestion {
 };
 
 /// Asks for each unit in turn. A refusal is reported with its unit, and the others are asked for
-/// all the same; only a daemon that does not answer ends it. With --json a single unit is the
-/// daemon's answer; several are {units: [answer + unit_id], refused: [{unit_id, code, text}]}.
-/// Returns kOk; kSomeUnserved where some units were refused; the code of the first refusal where
-/// all were.
+/// all the same; only a daemon that does not answer ends it, after what is known so far. With
+/// --json a single unit is the daemon's answer; several are {units: [answer + unit_id], refused:
+/// [{unit_id, code, text}]}. Returns kOk; kSomeUnserved where some units were refused; the code of
+/// the first refusal where all were.
 ExitCode AskForEach(const Context& context, const std::vector<std::uint32_t>& units,
                     const UnitQuestion& question);
 
