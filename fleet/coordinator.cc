@@ -37,8 +37,8 @@ class Coordinator::Impl {
     BeginStep(inputs.now, inputs.committed_through, inputs.store_failing, effects);
     EndEarlierConfigurations(fleet_);
     for (const ShellNote& note : inputs.notes) {
-      if (note.ends) ledger_.End(*note.ends, {}, {});
-      ledger_.Raise(note.name, {}, {}, note.text);
+      if (note.ends) ledger_.alarms().End(*note.ends, {}, {});
+      ledger_.alarms().Raise(note.name, {}, {}, note.text);
     }
     for (const RefusedRow& refused : inputs.refused) StoreRefused(fleet_, refused);
     for (const LinkEvent& link : inputs.links) sessions_.LinkChanged(link);
@@ -59,7 +59,7 @@ class Coordinator::Impl {
   void End(HostInstant now, Effects* effects) {
     BeginStep(now, ledger_.committed_through(), ledger_.store_failing(), effects);
     executor_.GiveUp();
-    ledger_.NoteAllFolded();
+    ledger_.alarms().NoteAllFolded();
     ledger_.CloseBatch();
   }
 

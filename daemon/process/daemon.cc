@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
 
 #include <atomic>
 #include <chrono>
@@ -12,12 +11,14 @@
 
 #include "daemon/camera/camera_dds.h"
 #include "daemon/camera/camera_folder.h"
+#include "daemon/clock/process_time.h"
 #include "daemon/loop/event_loop.h"
 #include "daemon/loop/status_thread.h"
 #include "daemon/metrics/metrics_endpoint.h"
 #include "daemon/metrics/metrics_sampler.h"
 #include "daemon/process/bounded_end.h"
 #include "daemon/process/caught_jobs.h"
+#include "daemon/process/counted_commit.h"
 #include "daemon/process/fleet_setup.h"
 #include "daemon/process/log.h"
 #include "daemon/process/slow_end.h"
@@ -35,15 +36,6 @@
 
 namespace focalfleet {
 namespace {
-
-double ProcessCpuSeconds() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_usec) * 1e-6;
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
 
 /// Limit of the time from the last turn of the loop until planner, camera and buses have ended.
 /// Parts that take longer are left behind. A planner checks every 0.1 s or more often whether it is
@@ -284,16 +276,7 @@ Status Daemon::OpenCamera() {
 StoreThread::Sinks Daemon::StoreSinks() {
   StoreThread::Sinks sinks;
   sinks.commit = [this](std::span<const Row> rows, WallTime at, std::size_t* refused) {
-    const auto begun = std::chrono::steady_clock::now();
-    Status done = store_->Commit(rows, at, refused);
-    WorkCounters& work = metrics_.work;
-    work.commit_s.Observe(SecondsSince(begun));
-    work.transactions = store_->counters().transactions;
-    work.rows = store_->counters().rows;
-    work.transactions_failed = store_->counters().failed;
-    if (!done && done.error().code == ErrorCode::kInvalid && *refused < rows.size())
-      ++work.rows_refused;
-    return done;
+    return CommitCounted(rows, at, refused, store_.get(), &metrics_.work);
   };
   sinks.publish = [this](StatusBatch* status) {
     return status_.thread == nullptr || status_.thread->Publish(status);

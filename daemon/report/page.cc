@@ -87,7 +87,7 @@ std::string Page::Html() const {
   std::string out =
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
-      // Texts of a campaign's files are on the page. It runs no script and fetches nothing.
+      // Texts of a campaign's files are on the page, which runs no script and fetches nothing.
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
       "style-src 'unsafe-inline'\"/>\n";
   out.append("<title>").append(title_).append("</title>\n<style>\n");

@@ -24,11 +24,11 @@ void ReportClock(const Coordination& fleet, PositionerIndex i, const ClockReply&
                        .bound_s = record.clock.TimeOf(reply.ticks).bound().seconds()};
   const double allowed = PlanOptions{}.clock_error;
   if (!rate.IsBeyond(allowed) || std::exchange(record.clock_reported, true)) return;
-  fleet.ledger.Raise(AlarmName::kUnitClockOff, i, {},
-                     fleet.units.NameOf(i) + "'s clock is off by " + InPercent(rate.least) +
-                         " to " + InPercent(rate.most) + ", more than the " + InPercent(allowed) +
-                         " that plans allow for (" + std::to_string(record.clock.readings()) +
-                         " readings)");
+  fleet.ledger.alarms().Raise(
+      AlarmName::kUnitClockOff, i, {},
+      fleet.units.NameOf(i) + "'s clock is off by " + InPercent(rate.least) + " to " +
+          InPercent(rate.most) + ", more than the " + InPercent(allowed) +
+          " that plans allow for (" + std::to_string(record.clock.readings()) + " readings)");
 }
 
 }  // namespace

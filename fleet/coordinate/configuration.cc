@@ -34,7 +34,7 @@ void EndEarlierConfigurations(const Coordination& fleet) {
   for (ConfigurationRow& row : fleet.ledger.earlier_configurations) {
     if (IsOver(row.state)) continue;
     row.state = ConfigurationState::kFailed;
-    fleet.ledger.Raise(AlarmName::kConfigurationCutShort, {}, {}, DaemonEnded(row.id));
+    fleet.ledger.alarms().Raise(AlarmName::kConfigurationCutShort, {}, {}, DaemonEnded(row.id));
     fleet.ledger.Note(row);
   }
   fleet.ledger.earlier_configurations.clear();

@@ -127,15 +127,15 @@ ConfigurationMeasurement::Progress ConfigurationMeasurement::OnExposure(const Ex
   ConfigurationView& view = configuration_.view;
   view.not_measured.clear();
   MeasuredRound round{.exposure = exposure_, .camera = done.exposure->camera};
-  fleet_.ledger.End(AlarmName::kExposureRefused, {}, {});
+  fleet_.ledger.alarms().End(AlarmName::kExposureRefused, {}, {});
   if (done.exposure->camera_trouble.empty()) {
-    fleet_.ledger.End(AlarmName::kCameraLate, {}, {});
-    fleet_.ledger.End(AlarmName::kCameraFailed, {}, {});
+    fleet_.ledger.alarms().End(AlarmName::kCameraLate, {}, {});
+    fleet_.ledger.alarms().End(AlarmName::kCameraFailed, {}, {});
   } else {
-    fleet_.ledger.Raise(AlarmName::kCameraFailed, {}, {},
-                        "exposure " + std::to_string(exposure_) + ": " +
-                            done.exposure->camera_trouble +
-                            "; units are measured by their own sensors alone");
+    fleet_.ledger.alarms().Raise(AlarmName::kCameraFailed, {}, {},
+                                 "exposure " + std::to_string(exposure_) + ": " +
+                                     done.exposure->camera_trouble +
+                                     "; units are measured by their own sensors alone");
   }
   std::vector<double> errors_um;
   for (const Measurement& measurement : done.exposure->measurements) {
@@ -161,9 +161,9 @@ ConfigurationMeasurement::Progress ConfigurationMeasurement::EndWhenLocated() {
 ConfigurationMeasurement::Progress ConfigurationMeasurement::Refuse(const Error& error) {
   // A camera that answers, however badly, is not late.
   const bool late = error.code == ErrorCode::kUnavailable;
-  if (!late) fleet_.ledger.End(AlarmName::kCameraLate, {}, {});
-  fleet_.ledger.Raise(late ? AlarmName::kCameraLate : AlarmName::kExposureRefused, {}, {},
-                      "exposure " + std::to_string(exposure_) + ": " + error.text);
+  if (!late) fleet_.ledger.alarms().End(AlarmName::kCameraLate, {}, {});
+  fleet_.ledger.alarms().Raise(late ? AlarmName::kCameraLate : AlarmName::kExposureRefused, {}, {},
+                               "exposure " + std::to_string(exposure_) + ": " + error.text);
   if (++exposures_refused_ < kExposuresRefusedMax) {
     AskForExposure();
     return Progress::kUnderWay;
@@ -171,12 +171,12 @@ ConfigurationMeasurement::Progress ConfigurationMeasurement::Refuse(const Error&
   failure_ = std::to_string(exposures_refused_) +
              " exposures could not be used, the last because " + error.text;
   if (look_ == Look::kBefore) {
-    fleet_.ledger.Raise(AlarmName::kLostNotSought, {}, {},
-                        "units of unknown place were not looked for: " + failure_);
+    fleet_.ledger.alarms().Raise(AlarmName::kLostNotSought, {}, {},
+                                 "units of unknown place were not looked for: " + failure_);
   } else {
-    fleet_.ledger.Raise(AlarmName::kConfigurationNotMeasured, {}, {},
-                        "configuration " + std::to_string(configuration_.view.id) +
-                            " is not measured: " + failure_);
+    fleet_.ledger.alarms().Raise(AlarmName::kConfigurationNotMeasured, {}, {},
+                                 "configuration " + std::to_string(configuration_.view.id) +
+                                     " is not measured: " + failure_);
     configuration_.view.not_measured = failure_;
   }
   return Progress::kFailed;
@@ -220,13 +220,14 @@ void ConfigurationMeasurement::WarnOf(const Measurement& measurement) const {
   const std::optional<Pose>& target = fleet_.units[i].view.target;
   if (look_ == Look::kAfter && measurement.status == MeasurementStatus::kDidNotMove && stood &&
       target && *stood != *target)
-    fleet_.ledger.Raise(AlarmName::kUnitDidNotMove, i, {},
-                        fleet_.units.NameOf(i) + " did not move, though it reports that it did");
+    fleet_.ledger.alarms().Raise(
+        AlarmName::kUnitDidNotMove, i, {},
+        fleet_.units.NameOf(i) + " did not move, though it reports that it did");
   if (measurement.status == MeasurementStatus::kSwapped && measurement.other)
-    fleet_.ledger.Raise(AlarmName::kUnitsSwapped, i, {},
-                        fleet_.units.NameOf(i) + " stands where " +
-                            fleet_.units.NameOf(*measurement.other) +
-                            " was sent: the two are confused in the layout or on the bus");
+    fleet_.ledger.alarms().Raise(AlarmName::kUnitsSwapped, i, {},
+                                 fleet_.units.NameOf(i) + " stands where " +
+                                     fleet_.units.NameOf(*measurement.other) +
+                                     " was sent: the two are confused in the layout or on the bus");
 }
 
 // A unit whose own sensors cannot be believed is reported once, when that is found.
@@ -237,9 +238,10 @@ void ConfigurationMeasurement::TakeFibreCarrier(PositionerIndex i,
   view.covariance = measurement.covariance;
   const std::string before = view.carrier && !view.carrier->trusted ? view.carrier->verdict : "";
   view.carrier = measurement.carrier;
-  if (view.carrier && view.carrier->trusted) fleet_.ledger.End(AlarmName::kSensorsDoubted, i, {});
+  if (view.carrier && view.carrier->trusted)
+    fleet_.ledger.alarms().End(AlarmName::kSensorsDoubted, i, {});
   if (view.carrier && !view.carrier->trusted && view.carrier->verdict != before)
-    fleet_.ledger.Raise(
+    fleet_.ledger.alarms().Raise(
         AlarmName::kSensorsDoubted, i, {},
         fleet_.units.NameOf(i) + " is not measured by its sensors: " + view.carrier->verdict);
 }

@@ -82,9 +82,10 @@ void ConfigurationProgress::OnPlan(const PlanDone& done) {
   if (configuration_.phase() != Phase::kPlanning || done.job != round_.job) return;
   if (done.plan) return TakePlan(done);
   if (rooms_.corrections.goes_past()) {  // then the units come to their targets as they can
-    fleet_.ledger.Raise(AlarmName::kNoRunUp, {}, {},
-                        "no run-up: from which side the targets are approached is left open (" +
-                            done.plan.error().text + ")");
+    fleet_.ledger.alarms().Raise(
+        AlarmName::kNoRunUp, {}, {},
+        "no run-up: from which side the targets are approached is left open (" +
+            done.plan.error().text + ")");
     rooms_.corrections.GiveUpApproach();
     Gather();
     return;
@@ -99,8 +100,8 @@ void ConfigurationProgress::TakePlan(const PlanDone& done) {
   round_.plan = *done.plan;
   const Plan& plan = round_.plan;
   if (!plan.too_near.empty())
-    fleet_.ledger.Raise(AlarmName::kUnitsTooNear, {}, {},
-                        plan.too_near + ": they may touch, and are led apart");
+    fleet_.ledger.alarms().Raise(AlarmName::kUnitsTooNear, {}, {},
+                                 plan.too_near + ": they may touch, and are led apart");
   rooms_.homing.SetWave(done.homing);
   round_.running = done.running;
   const bool stale = std::ranges::any_of(plan.moves, [&](const UnitPlan& move) {

@@ -122,7 +122,7 @@ bool Corrections::GoPast(std::vector<std::optional<Pose>>* targets) {
     any |= goes;
   }
   if (without > 0 && blind)
-    fleet_.ledger.Raise(
+    fleet_.ledger.alarms().Raise(
         AlarmName::kRunUpsLeftOut, {}, {},
         std::to_string(without) +
             " units have no room for a run-up: from which side they come is left open");

@@ -23,9 +23,10 @@ void OnCountWritten(const Coordination& fleet, PositionerIndex i, const Paramete
   if (reply.axis != locating.axis) return;
   if (reply.answer != Answer::kOk) {
     record.locating.reset();
-    fleet.ledger.Raise(AlarmName::kCountRefused, i, {},
-                       fleet.units.NameOf(i) + " was found, but refuses to count from there: " +
-                           Name(reply.answer) + "; its place stays unknown");
+    fleet.ledger.alarms().Raise(AlarmName::kCountRefused, i, {},
+                                fleet.units.NameOf(i) +
+                                    " was found, but refuses to count from there: " +
+                                    Name(reply.answer) + "; its place stays unknown");
     return;
   }
   locating.count[Index(locating.axis)] = reply.value;

@@ -64,7 +64,7 @@ Status ConfigurationExecutor::Home(std::uint64_t request, const HomeCommand& com
   FOCALFLEET_TRY_ASSIGN(const Goal goal, GoalOf(fleet_, command));
   progress_.Begin(request, goal);
   if (goal.unproven)
-    fleet_.ledger.Raise(
+    fleet_.ledger.alarms().Raise(
         AlarmName::kHomingUnproven, {}, {},
         "homing of " + std::to_string(command.units.size()) +
             " units without proof that their neighbours are out of the way, as commanded");
@@ -94,7 +94,7 @@ Status ConfigurationExecutor::Retarget(std::uint64_t request, const RetargetComm
   const std::string name = fleet_.units.NameOf(i);
   rooms_.configuration.Retarget(i, command.target);
   rooms_.corrections.Forget(i);
-  fleet_.ledger.Raise(AlarmName::kUnitRetargeted, i, {}, name + " gets another target");
+  fleet_.ledger.alarms().Raise(AlarmName::kUnitRetargeted, i, {}, name + " gets another target");
   if (rooms_.round.part(i) == Part::kMoving) {
     StopFollowers(fleet_, rooms_.round, i,
                   {fleet_.now(), fleet_.now() + fleet_.requests.Patience()},
@@ -136,7 +136,7 @@ void ConfigurationExecutor::StoppedByAnotherHost(PositionerIndex i) {
   const Configuration& configuration = rooms_.configuration;
   if (!busy() || configuration.stopping || configuration.phase() == ConfigurationPhase::kReporting)
     return;
-  fleet_.ledger.Raise(
+  fleet_.ledger.alarms().Raise(
       AlarmName::kStoppedByOther, i, {},
       fleet_.units.NameOf(i) + " was stopped on the bus by somebody else: configuration " +
           std::to_string(view().id) + " ends, nothing moves until an operator applies again");
@@ -146,7 +146,7 @@ void ConfigurationExecutor::StoppedByAnotherHost(PositionerIndex i) {
 void ConfigurationExecutor::GiveUp() {
   if (!busy()) return;
   rooms_.configuration.view.state = ConfigurationState::kFailed;
-  fleet_.ledger.Raise(AlarmName::kConfigurationCutShort, {}, {}, DaemonEnded(view().id));
+  fleet_.ledger.alarms().Raise(AlarmName::kConfigurationCutShort, {}, {}, DaemonEnded(view().id));
   rooms_.configuration.Record();
 }
 

@@ -43,7 +43,7 @@ void NameExchange(const Coordination& fleet, PositionerIndex i) {
   if (j == i || there.phase != kForeign || there.serial != view.bound_serial) return;
   const std::string id = std::to_string(fleet.layout.unit(i).id.value);
   const std::string other_id = std::to_string(fleet.layout.unit(j).id.value);
-  fleet.ledger.Raise(
+  fleet.ledger.alarms().Raise(
       AlarmName::kUnitsExchanged, i, {},
       "units " + other_id + " and " + id +
           " are exchanged: each answers with the other's serial number. Exchange their "
@@ -67,17 +67,17 @@ bool Belongs(const Coordination& fleet, PositionerIndex i) {
   } else if (view.bound_serial != view.serial) {
     view.knowledge = {};
     fleet.units.SetPhase(i, kForeign);
-    fleet.ledger.Raise(AlarmName::kUnitForeign, i, {},
-                       fleet.units.NameOf(i) + " answers with serial number " +
-                           std::to_string(view.serial.value) + ", " + fleet.units.WhoseSerial(i) +
-                           ", not " + std::to_string(view.bound_serial.value) +
-                           ": it is not moved until it is adopted");
+    fleet.ledger.alarms().Raise(
+        AlarmName::kUnitForeign, i, {},
+        fleet.units.NameOf(i) + " answers with serial number " + std::to_string(view.serial.value) +
+            ", " + fleet.units.WhoseSerial(i) + ", not " + std::to_string(view.bound_serial.value) +
+            ": it is not moved until it is adopted");
     NameExchange(fleet, i);
     fleet.units.Report(i, UnitEventKind::kLost, "has another serial number");
     return false;
   }
-  fleet.ledger.End(AlarmName::kUnitForeign, i, {});
-  fleet.ledger.End(AlarmName::kUnitsExchanged, i, {});
+  fleet.ledger.alarms().End(AlarmName::kUnitForeign, i, {});
+  fleet.ledger.alarms().End(AlarmName::kUnitsExchanged, i, {});
   return true;
 }
 
@@ -102,9 +102,9 @@ bool IsReadable(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];
   const std::string unfit = MisfitOf(fleet, i);
   if (!unfit.empty() && unfit != record.trouble.unfit)
-    fleet.ledger.Raise(AlarmName::kUnitUnfit, i, {},
-                       fleet.units.NameOf(i) + " is not fit to move: " + unfit);
-  if (unfit.empty()) fleet.ledger.End(AlarmName::kUnitUnfit, i, {});
+    fleet.ledger.alarms().Raise(AlarmName::kUnitUnfit, i, {},
+                                fleet.units.NameOf(i) + " is not fit to move: " + unfit);
+  if (unfit.empty()) fleet.ledger.alarms().End(AlarmName::kUnitUnfit, i, {});
   record.trouble.unfit = unfit;
   for (const Axis axis : kAxes)
     if (record.reading.subdivision[Index(axis)] != fleet.drive(i).axis[Index(axis)].subdivision)
@@ -137,15 +137,16 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
     Know(fleet, i, result.knowledge, Origin::kMove);
   view.knowledge = result.knowledge;
   const bool was_known = !store.vector || IsPlace(store.vector->knowledge);
-  if (IsPlace(result.knowledge)) fleet.ledger.End(AlarmName::kUnitPlaceLost, i, {});
+  if (IsPlace(result.knowledge)) fleet.ledger.alarms().End(AlarmName::kUnitPlaceLost, i, {});
   if (!IsPlace(result.knowledge) && (result.intent_end || was_known))
-    fleet.ledger.Raise(AlarmName::kUnitPlaceLost, i, {},
-                       fleet.units.NameOf(i) + ": position " + Name(result.knowledge[0].witness) +
-                           ", " + result.reason);
+    fleet.ledger.alarms().Raise(AlarmName::kUnitPlaceLost, i, {},
+                                fleet.units.NameOf(i) + ": position " +
+                                    Name(result.knowledge[0].witness) + ", " + result.reason);
   if (reading.status.state == UnitState::kFault) {
     fleet.units.SetPhase(i, kFault);
-    if (!fleet.ledger.Lasts(AlarmName::kUnitFault, i))
-      fleet.ledger.Raise(AlarmName::kUnitFault, i, {}, fleet.units.NameOf(i) + " is in fault");
+    if (!fleet.ledger.alarms().Lasts(AlarmName::kUnitFault, i))
+      fleet.ledger.alarms().Raise(AlarmName::kUnitFault, i, {},
+                                  fleet.units.NameOf(i) + " is in fault");
     fleet.units.Report(i, UnitEventKind::kLost, "is in fault");
     return;
   }
@@ -154,7 +155,7 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
     return;
   }
   fleet.units.SetPhase(i, kReady);
-  fleet.ledger.End(AlarmName::kUnitFault, i, {});
+  fleet.ledger.alarms().End(AlarmName::kUnitFault, i, {});
   const bool short_of_its_end = result.intent_end && *result.intent_end != IntentEnd::kArrived;
   fleet.units.Report(i, short_of_its_end ? UnitEventKind::kStopped : UnitEventKind::kReady);
 }
@@ -210,11 +211,12 @@ void NotToBeRead(const Coordination& fleet, PositionerIndex i, const std::string
 void OnOtherVersion(const Coordination& fleet, PositionerIndex i, const IdentifyReply& identity) {
   UnitRecord& record = fleet.units[i];
   if (record.trouble.other_version != identity.protocol_version)
-    fleet.ledger.Raise(AlarmName::kUnitOtherVersion, i, {},
-                       fleet.units.NameOf(i) + " speaks protocol version " +
-                           std::to_string(identity.protocol_version) + ", not " +
-                           std::to_string(kProtocolVersion) + " or " +
-                           std::to_string(kProtocolVersionWithSensors) + ": it is not moved");
+    fleet.ledger.alarms().Raise(AlarmName::kUnitOtherVersion, i, {},
+                                fleet.units.NameOf(i) + " speaks protocol version " +
+                                    std::to_string(identity.protocol_version) + ", not " +
+                                    std::to_string(kProtocolVersion) + " or " +
+                                    std::to_string(kProtocolVersionWithSensors) +
+                                    ": it is not moved");
   record.trouble.other_version = identity.protocol_version;
   record.view.serial = identity.serial;
   NotToBeRead(fleet, i, "speaks another protocol version");
@@ -225,10 +227,11 @@ void OnOtherVersion(const Coordination& fleet, PositionerIndex i, const Identify
 void OnNoSerial(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];
   if (!std::exchange(record.trouble.no_serial, true))
-    fleet.ledger.Raise(AlarmName::kUnitWithoutSerial, i, {},
-                       fleet.units.NameOf(i) +
-                           " answers with serial number 0: its memory is lost, or it was never "
-                           "programmed; it is not moved");
+    fleet.ledger.alarms().Raise(
+        AlarmName::kUnitWithoutSerial, i, {},
+        fleet.units.NameOf(i) +
+            " answers with serial number 0: its memory is lost, or it was never "
+            "programmed; it is not moved");
   record.view.serial = {};
   NotToBeRead(fleet, i, "has no serial number");
 }
@@ -277,19 +280,20 @@ void Lose(const Coordination& fleet, PositionerIndex i, UnitPhase phase, const s
   record.next_poll = fleet.now() + fleet.config.identify_period;
   fleet.timers.Set(i, record.next_poll);
   if (alarm)
-    fleet.ledger.Raise(phase == kSilent ? AlarmName::kUnitSilent : AlarmName::kUnitFault, i, {},
-                       fleet.units.NameOf(i) + " " + reason + " (was " + Name(before) + ")");
+    fleet.ledger.alarms().Raise(
+        phase == kSilent ? AlarmName::kUnitSilent : AlarmName::kUnitFault, i, {},
+        fleet.units.NameOf(i) + " " + reason + " (was " + Name(before) + ")");
   fleet.units.Report(i, UnitEventKind::kLost, reason);
 }
 
 void OnIdentity(const Coordination& fleet, PositionerIndex i, const IdentifyReply& identity) {
   UnitRecord& record = fleet.units[i];
   record.asked_once = true;
-  fleet.ledger.End(AlarmName::kUnitSilent, i, {});
+  fleet.ledger.alarms().End(AlarmName::kUnitSilent, i, {});
   if (!IsSpoken(identity.protocol_version)) return OnOtherVersion(fleet, i, identity);
   if (identity.serial.value == 0) return OnNoSerial(fleet, i);
-  fleet.ledger.End(AlarmName::kUnitOtherVersion, i, {});
-  fleet.ledger.End(AlarmName::kUnitWithoutSerial, i, {});
+  fleet.ledger.alarms().End(AlarmName::kUnitOtherVersion, i, {});
+  fleet.ledger.alarms().End(AlarmName::kUnitWithoutSerial, i, {});
   record.trouble.no_serial = false;
   record.protocol_version = identity.protocol_version;
   record.trouble.other_version.reset();

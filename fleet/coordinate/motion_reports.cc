@@ -42,8 +42,8 @@ void OnMotionStatus(const Coordination& fleet, PositionerIndex i, const StatusRe
   if (status.restarted || status.interrupted) {
     Identify(fleet, i);
     fleet.units.Report(i, UnitEventKind::kLost, "lost power in mid-move");
-    fleet.ledger.Raise(AlarmName::kUnitLostPower, i, {},
-                       fleet.units.NameOf(i) + " lost power in mid-move");
+    fleet.ledger.alarms().Raise(AlarmName::kUnitLostPower, i, {},
+                                fleet.units.NameOf(i) + " lost power in mid-move");
   } else if (!began && status.state == UnitState::kArmed &&
              fleet.units[i].request.answered_asked < fleet.units[i].motion.begun_by) {
     // The start signal may still be on its way. A unit that starts late within the notice is clear
@@ -57,8 +57,8 @@ void OnMotionStatus(const Coordination& fleet, PositionerIndex i, const StatusRe
   } else if (!began) {
     Identify(fleet, i);  // takes the move back, if it still holds one
     fleet.units.Report(i, UnitEventKind::kNeverBegan, "did not begin to move");
-    fleet.ledger.Raise(AlarmName::kUnitNeverBegan, i, {},
-                       fleet.units.NameOf(i) + " did not begin to move");
+    fleet.ledger.alarms().Raise(AlarmName::kUnitNeverBegan, i, {},
+                                fleet.units.NameOf(i) + " did not begin to move");
   } else {
     Identify(fleet, i);  // its own report was lost; its FLASH holds its place
     fleet.units.Report(i, UnitEventKind::kEnded);

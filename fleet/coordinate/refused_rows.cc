@@ -47,7 +47,7 @@ void StoreRefused(const Coordination& fleet, const RefusedRow& refused) {
   if (std::holds_alternative<AlarmRow>(refused.row) ||
       std::holds_alternative<OpenAlarmRow>(refused.row))
     return;
-  fleet.ledger.Raise(
+  fleet.ledger.alarms().Raise(
       AlarmName::kRowRefused, unit, {},
       "the store refuses the " + Describe(refused.row) + ": " + refused.why +
           (stands ? "; " + fleet.units.NameOf(*unit) + " is not moved until it is enabled again"

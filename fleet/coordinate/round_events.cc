@@ -108,7 +108,7 @@ void FailBeforeStart(PositionerIndex i, const std::string& reason, ExecutorRooms
   const Coordination& fleet = rooms->fleet;
   fleet.requests.Forget(i);
   rooms->configuration.Strike(i, reason);
-  fleet.ledger.Raise(AlarmName::kUnitRefused, i, {}, fleet.units.NameOf(i) + " " + reason);
+  fleet.ledger.alarms().Raise(AlarmName::kUnitRefused, i, {}, fleet.units.NameOf(i) + " " + reason);
   rooms->upload.Leave(i);
   // A move that the unit holds is taken back by reading it anew.
   Identify(fleet, i);

@@ -104,13 +104,13 @@ void RoundStart::Judge() {
     return fleet_.units.NameOf(i) + " (bus " + std::to_string(fleet_.units.bus_of(i).id.value) +
            ")";
   };
-  fleet_.ledger.Raise(AlarmName::kStartsApart, last.unit, fleet_.units.bus_of(last.unit).id,
-                      name(last.unit) + " began " + InMilliseconds(least_s) + " to " +
-                          InMilliseconds((last.began.latest - first.began.earliest).seconds()) +
-                          " after " + name(first.unit) + ", more than the " +
-                          InMilliseconds(allowed_s) +
-                          " that the plan allowed for; from now on plans allow for " +
-                          InMilliseconds(2 * round_.next_skew_s));
+  fleet_.ledger.alarms().Raise(
+      AlarmName::kStartsApart, last.unit, fleet_.units.bus_of(last.unit).id,
+      name(last.unit) + " began " + InMilliseconds(least_s) + " to " +
+          InMilliseconds((last.began.latest - first.began.earliest).seconds()) + " after " +
+          name(first.unit) + ", more than the " + InMilliseconds(allowed_s) +
+          " that the plan allowed for; from now on plans allow for " +
+          InMilliseconds(2 * round_.next_skew_s));
 }
 
 }  // namespace focalfleet

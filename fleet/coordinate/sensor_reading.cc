@@ -38,14 +38,14 @@ void OnSensors(const Coordination& fleet, PositionerIndex i, const SensorsReply&
   ++sensing.next_part;
   if (sensing.under_way()) return;
   sensing.reading.sensors = fleet.layout.unit(i).sensors;
-  fleet.ledger.End(AlarmName::kSensorsSilent, i, {});
+  fleet.ledger.alarms().End(AlarmName::kSensorsSilent, i, {});
 }
 
 void SensorsDoNotAnswer(const Coordination& fleet, PositionerIndex i, const std::string& what) {
   fleet.units[i].sensing = {};
   fleet.units[i].sensing.given_up = true;
-  fleet.ledger.Raise(AlarmName::kSensorsSilent, i, {},
-                     fleet.units.NameOf(i) + " has sensors, but " + what);
+  fleet.ledger.alarms().Raise(AlarmName::kSensorsSilent, i, {},
+                              fleet.units.NameOf(i) + " has sensors, but " + what);
 }
 
 }  // namespace focalfleet

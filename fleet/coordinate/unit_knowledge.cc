@@ -28,7 +28,7 @@ void Know(const Coordination& fleet, PositionerIndex i, const UnitKnowledge& kno
   UnitRecord& record = fleet.units[i];
   record.view.knowledge = knowledge;
   fleet.units.Changed(i);
-  if (IsPlace(knowledge)) fleet.ledger.End(AlarmName::kUnitPlaceLost, i, {});
+  if (IsPlace(knowledge)) fleet.ledger.alarms().End(AlarmName::kUnitPlaceLost, i, {});
   VectorRow row{
       .serial = record.view.serial,
       .knowledge = knowledge,

@@ -62,7 +62,7 @@ void OnParameter(const Coordination& fleet, PositionerIndex i, const ParameterRe
     if (record.view.phase != kIdentifying) OnWritten(fleet, i, reply);
     // A misfit is read with every poll, and one alarm is enough.
     if (reply.answer != Answer::kOk && record.trouble.unfit.empty())
-      fleet.ledger.Raise(
+      fleet.ledger.alarms().Raise(
           AlarmName::kParameterRefused, i, {},
           fleet.units.NameOf(i) + " refuses " + Name(reply.parameter) + ": " + Name(reply.answer));
     return;

@@ -120,15 +120,16 @@ void UnitSessions::LinkChanged(const LinkEvent& event) {
   const std::string name = "bus " + std::to_string(event.bus.value);
   const std::string cause = event.cause.empty() ? "" : ": " + event.cause;
   if (before == event.state) {
-    if (!cause.empty()) fleet_.ledger.Raise(AlarmName::kBusTrouble, {}, event.bus, name + cause);
+    if (!cause.empty())
+      fleet_.ledger.alarms().Raise(AlarmName::kBusTrouble, {}, event.bus, name + cause);
     return;
   }
   bus->view.link = event.state;
   if (event.state == LinkState::kUp || event.state == LinkState::kPassive)
-    fleet_.ledger.End(AlarmName::kBusDown, {}, event.bus);
+    fleet_.ledger.alarms().End(AlarmName::kBusDown, {}, event.bus);
   if (event.state == LinkState::kUp) {
-    fleet_.ledger.End(AlarmName::kBusPassive, {}, event.bus);
-    fleet_.ledger.Raise(AlarmName::kBusUp, {}, event.bus, name + " is up");
+    fleet_.ledger.alarms().End(AlarmName::kBusPassive, {}, event.bus);
+    fleet_.ledger.alarms().Raise(AlarmName::kBusUp, {}, event.bus, name + " is up");
     for (const PositionerIndex i : bus->units) {
       fleet_.units[i].next_poll = fleet_.now();
       if (!fleet_.units[i].request.question) fleet_.timers.Set(i, fleet_.now());
@@ -136,17 +137,18 @@ void UnitSessions::LinkChanged(const LinkEvent& event) {
     return;
   }
   if (event.state == LinkState::kPassive) {
-    fleet_.ledger.Raise(AlarmName::kBusPassive, {}, event.bus, name + " is passive" + cause);
+    fleet_.ledger.alarms().Raise(AlarmName::kBusPassive, {}, event.bus,
+                                 name + " is passive" + cause);
     return;
   }
   if (before == LinkState::kOff || before == LinkState::kDown) {
-    fleet_.ledger.Raise(AlarmName::kBusDown, {}, event.bus,
-                        name + " is " + Name(event.state) + cause);
+    fleet_.ledger.alarms().Raise(AlarmName::kBusDown, {}, event.bus,
+                                 name + " is " + Name(event.state) + cause);
     return;
   }
-  fleet_.ledger.Raise(AlarmName::kBusDown, {}, event.bus,
-                      name + " is " + Name(event.state) + cause + "; its " +
-                          std::to_string(bus->units.size()) + " units cannot be reached");
+  fleet_.ledger.alarms().Raise(AlarmName::kBusDown, {}, event.bus,
+                               name + " is " + Name(event.state) + cause + "; its " +
+                                   std::to_string(bus->units.size()) + " units cannot be reached");
   for (const PositionerIndex i : bus->units) {
     const UnitPhase phase = fleet_.units[i].view.phase;
     if (phase != kAbsent && phase != kSilent)

@@ -89,8 +89,8 @@ void StopFollowers(const Coordination& fleet, const Round& round, PositionerInde
 void StopOne(const Coordination& fleet, PositionerIndex i, const std::string& reason) {
   fleet.requests.Forget(i);
   fleet.requests.Ask(i, Stop{});
-  fleet.ledger.Raise(AlarmName::kUnitHeldBack, i, {},
-                     fleet.units.NameOf(i) + " is stopped: " + reason);
+  fleet.ledger.alarms().Raise(AlarmName::kUnitHeldBack, i, {},
+                              fleet.units.NameOf(i) + " is stopped: " + reason);
 }
 
 }  // namespace focalfleet

@@ -47,7 +47,7 @@ void Refit(Fit* fit) {
   SettleFit(fit, 2);
 }
 
-// What all units do alike moves the image, too, until it has a term.
+// An error that all units have alike moves the image, too, until it has a term.
 void FindImageAnew(const PatchRule& rule, Fit* fit) {
   if (fit->model.exposures.empty()) return;
   fit->model.exposures.clear();

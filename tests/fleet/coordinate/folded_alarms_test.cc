@@ -24,8 +24,8 @@ class Steps {
     step_ = {HostInstant{0} + at, &effects_};
     ledger_.BeginStep(0, false);
     for (int k = 0; k < flaps; ++k) {
-      ledger_.Raise(AlarmName::kBusPassive, {}, BusId{3}, "bus 3 is passive");
-      if (k + 1 < flaps || ends_well) ledger_.End(AlarmName::kBusPassive, {}, BusId{3});
+      ledger_.alarms().Raise(AlarmName::kBusPassive, {}, BusId{3}, "bus 3 is passive");
+      if (k + 1 < flaps || ends_well) ledger_.alarms().End(AlarmName::kBusPassive, {}, BusId{3});
     }
     Take();
   }
@@ -33,7 +33,7 @@ class Steps {
   void End(DurationNs at) {
     effects_.Clear();
     step_ = {HostInstant{0} + at, &effects_};
-    ledger_.NoteAllFolded();
+    ledger_.alarms().NoteAllFolded();
     Take();
   }
   Ledger* ledger() { return &ledger_; }
@@ -109,7 +109,7 @@ TEST(Ledger, FoldedAlarmsAreNotedAtTheEnd) {
 TEST(Ledger, DifferentAlarmsOfOneKindAreNotCalledTheSame) {
   Steps steps;
   for (int k = 0; k < 9; ++k)
-    steps.ledger()->Raise(AlarmName::kRowRefused, {}, {}, "row " + std::to_string(k));
+    steps.ledger()->alarms().Raise(AlarmName::kRowRefused, {}, {}, "row " + std::to_string(k));
   steps.End(Seconds(0));
   EXPECT_EQ(steps.alarms.back().text, "row 8 (6 of its kind in 0 s)");
 }

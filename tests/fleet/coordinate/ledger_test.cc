@@ -68,7 +68,7 @@ TEST(Ledger, ConditionsOfWhatLeftTheConfigurationEndAtTheStart) {
                    {"ExposureRefused", "the camera left the configuration"},
                    {"CameraFailed", "the camera left the configuration"},
                    {"SensorsSilent", "the sensors of unit 1 left the configuration"}}));
-  EXPECT_TRUE(ledger.Lasts(AlarmName::kUnitFault, {0})) << "the unit is still there";
+  EXPECT_TRUE(ledger.alarms().Lasts(AlarmName::kUnitFault, {0})) << "the unit is still there";
   EXPECT_TRUE(EndedAt(HostInstant{1}, &ledger, &step).empty()) << "each once";
 }
 
