@@ -20,9 +20,8 @@ struct CopyOptions {
 };
 
 ExitCode RunCheck(const Context& context, const CheckOptions& options) {
-  const auto health = InspectHealth(options.file);
+  const auto health = CheckStore(options.file);
   if (!health) return Report(context, health.error());
-  if (const Status sound = CheckStore(options.file); !sound) return Report(context, sound.error());
   if (context.json)
     PrintJson({{"file", options.file},
                {"version", health->version},

@@ -124,6 +124,7 @@ Status Store::Commit(std::span<const Row> rows, WallTime now, std::size_t* refus
     if (!std::holds_alternative<IntentEndRow>(rows[k])) continue;
     if (auto written = write(k); !written) return Rollback(written.error());
   }
+  if (auto counted = writer.Finish(); !counted) return Rollback(counted.error());
   if (auto done = (*statements_)[Sql::kCommit].Run(); !done) return Rollback(done.error());
   ++counters_.transactions;
   counters_.rows += rows.size();

@@ -26,7 +26,7 @@ tl::unexpected<Error> FailSystem(const std::string& path, const char* what, int 
 }
 
 Status CheckFree(const std::string& path) {
-  for (const char* const suffix : {"", "-wal"}) {
+  for (const char* const suffix : {"", "-wal", "-journal"}) {
     std::error_code error;
     if (std::filesystem::symlink_status(path + suffix, error).type() !=
         std::filesystem::file_type::not_found)
@@ -91,9 +91,15 @@ Status Copy(const std::string& from, const std::string& to, Afterwards afterward
     FOCALFLEET_TRY(CopyPages(*source, *target));
     // A backup is one file, whatever program copies it on.
     FOCALFLEET_TRY(target->Execute("PRAGMA journal_mode = DELETE"));
-    if (afterwards != nullptr) FOCALFLEET_TRY(afterwards(*target));
   }
   FOCALFLEET_TRY(CheckStore(to, options));
+  if (afterwards != nullptr) {
+    // What was checked is changed, and its checksums with it. A wrong value would look right.
+    FOCALFLEET_TRY_ASSIGN(const auto target,
+                          Connection::Open(to, Connection::Mode::kWrite, options.vfs, wait_ms));
+    FOCALFLEET_TRY(afterwards(*target));
+  }
+  if (afterwards != nullptr) FOCALFLEET_TRY(CheckStore(to, options));
   return Sync(to, 0);
 }
 
@@ -116,16 +122,17 @@ Status CopyAtOnce(const std::string& from, const std::string& to, Afterwards aft
 
 }  // namespace
 
-Status CheckStore(const std::string& path, const StoreOptions& options) {
-  FOCALFLEET_TRY_ASSIGN(const StoreHealth health, InspectHealth(path, options));
+Result<StoreHealth> CheckStore(const std::string& path, const StoreOptions& options) {
+  FOCALFLEET_TRY_ASSIGN(StoreHealth health, InspectHealth(path, options));
   if (!health.flaw.empty()) return Fail(ErrorCode::kInvalid, "store " + path + ": " + health.flaw);
+  if (health.version == 0) return Fail(ErrorCode::kInvalid, "store " + path + ": nothing is in it");
   // Older schemas lack columns; the daemon carries them over before it loads.
-  if (health.version < health.version_expected) return {};
+  if (health.version < health.version_expected) return health;
   FOCALFLEET_TRY_ASSIGN(const auto connection,
                         Connection::Open(path, Connection::Mode::kRead, options.vfs,
                                          static_cast<int>(options.busy_wait.count())));
   FOCALFLEET_TRY(LoadFleet(*connection));
-  return {};
+  return health;
 }
 
 Status BackUpStore(const std::string& from, const std::string& to, const StoreOptions& options) {

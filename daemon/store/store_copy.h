@@ -4,14 +4,16 @@
 
 #include <string>
 
+#include "daemon/store/store_health.h"
 #include "daemon/store/store_options.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet {
 
 /// The file can be read by the daemon: pages and all rows that the daemon loads are checked, with
-/// their checksums. Errors: kInvalid: the first fault, by table and row; else as InspectHealth.
-Status CheckStore(const std::string& path, const StoreOptions& options = {});
+/// their checksums. Errors: kInvalid: the first fault, by table and row, or nothing is in it; else
+/// as InspectHealth.
+Result<StoreHealth> CheckStore(const std::string& path, const StoreOptions& options = {});
 
 /// `to` is a durable copy of the store `from`, checked as CheckStore does, complete or not there.
 /// Errors: kRefused: `to` exists; kFull, kUnavailable; kInvalid: `from` is no sound store.
