@@ -19,6 +19,18 @@ using test::Tuned;
 using test::Vector;
 using ::testing::HasSubstr;
 
+/// The rows that are gone after a whole round.
+std::uint64_t PruneAll(Store& store, WallTime before) {
+  std::uint64_t gone = 0;
+  for (;;) {
+    const auto pruned = store.Prune(before, 100);
+    EXPECT_TRUE(pruned) << pruned.error().text;
+    if (!pruned) return gone;
+    gone += pruned->rows;
+    if (!pruned->more) return gone;
+  }
+}
+
 ModelRow Loaded(std::uint64_t entry, const std::string& sha256, const std::string& text) {
   return {.entry = entry,
           .sha256 = sha256,
@@ -255,8 +267,8 @@ TEST_F(StoreTest, PruneTakesOldHistoryAndNoNextIds) {
           OpenAlarmRow{.id = 8, .last_unix_ns = kEight.ns},
           OpenAlarmRow{.id = 9, .state = OpenAlarmRow::State::kOver, .last_unix_ns = kEight.ns}},
       kEight));
-  EXPECT_EQ(store->Prune(kEight, 100), 0u);
-  EXPECT_EQ(store->Prune(kNine, 100), 3u) << "an alarm that lasts and the newest one stay";
+  EXPECT_EQ(PruneAll(*store, kEight), 0u);
+  EXPECT_EQ(PruneAll(*store, kNine), 3u) << "an alarm that lasts and the newest one stay";
   const auto fleet = store->Load();
   EXPECT_EQ(fleet->open_intents.size(), 1u);
   EXPECT_EQ(fleet->next_configuration, 9u);
@@ -272,10 +284,17 @@ TEST_F(StoreTest, PruneTakesNoMoreRowsAtOnceThanAsked) {
                          EnableRow{{1}, move % 2 == 0, "by turns"},
                          ParameterRow{{1}, Axis::kPhi, Parameter::kRepeat, move, Origin::kTuning}},
         kEight));
-  EXPECT_EQ(store->Prune(kNine, 2), 6u) << "two motions, two changes of the unit, of a parameter";
-  EXPECT_EQ(store->Prune(kNine, 2), 6u);
-  EXPECT_EQ(store->Prune(kNine, 2), 3u);
-  EXPECT_EQ(store->Prune(kNine, 2), 0u);
+  std::uint64_t gone = 0;
+  bool more = true;
+  while (more) {
+    const auto pruned = store->Prune(kNine, 2);
+    ASSERT_TRUE(pruned) << pruned.error().text;
+    EXPECT_LE(pruned->rows, 2u);
+    gone += pruned->rows;
+    more = pruned->more;
+  }
+  EXPECT_EQ(gone, 5u + 4u + 4u) << "motions; changes of the unit and of a parameter but the newest";
+  EXPECT_EQ(PruneAll(*store, kNine), 0u);
   EXPECT_EQ(store->Load()->parameters.size(), 1u);
   EXPECT_EQ(store->Load()->units.size(), 1u);
 }
@@ -292,9 +311,76 @@ TEST_F(StoreTest, PruneKeepsWhatSaysForWhichUnitsAModelHolds) {
   test::ExpectDone(store->Commit(std::vector<Row>{ModelRow{.entry = 1}}, {2}));
   test::ExpectDone(store->Commit(
       std::vector<Row>{Vector(7, Witness::kReported, 1, 1, 3, Origin::kOperator)}, kEight));
-  EXPECT_EQ(store->Prune(kNine, 100), 2u) << "the first homing, the binding before all models";
+  EXPECT_EQ(PruneAll(*store, kNine), 1u) << "the first homing";
   EXPECT_EQ(OpenReader()->CountedAnewSince({2}), std::vector<UnitId>{{12}});
-  EXPECT_EQ(store->Prune(kNine, 100), 0u);
+  EXPECT_EQ(PruneAll(*store, kNine), 0u);
+}
+
+TEST_F(StoreTest, PruneKeepsTheUnitThatAPlaceHadBeforeTheFirstModel) {
+  auto store = OpenStore();
+  test::ExpectDone(
+      store->Commit(std::vector<Row>{BindingRow{{12}, {6}}, BindingRow{{13}, {9}}}, {1}));
+  test::ExpectDone(store->Commit(std::vector<Row>{BindingRow{{12}, {7}}}, {2}));
+  test::ExpectDone(store->Commit(std::vector<Row>{EnableRow{{12}, false, "bent"}}, {2}));
+  test::ExpectDone(store->Commit(std::vector<Row>{BindingRow{{14}, {7}}}, {3}));  // 12 has none
+  EXPECT_EQ(PruneAll(*store, kEight), 2u) << "two of unit 12 before it was unbound";
+  test::ExpectDone(store->Commit(std::vector<Row>{ModelRow{.entry = 1}}, {4}));
+  EXPECT_EQ(PruneAll(*store, kEight), 0u);
+  test::ExpectDone(
+      store->Commit(std::vector<Row>{BindingRow{{12}, {8}}, EnableRow{{13}, false, "bent"}}, {5}));
+  EXPECT_EQ(OpenReader()->CountedAnewSince({4}), std::vector<UnitId>{{12}}) << "adopted since";
+}
+
+TEST_F(StoreTest, PruneKeepsNumbersOfChangesOfUnitsAscending) {
+  auto store = OpenStore();
+  test::ExpectDone(store->Commit(
+      std::vector<Row>{BindingRow{{12}, {7}}, EnableRow{{12}, false, "bent"}}, kEight));
+  const std::uint64_t newest = OpenReader()->NewestEntries()->unit;
+  EXPECT_EQ(newest, 2u);
+  PruneAll(*store, kNine);
+  EXPECT_EQ(OpenReader()->NewestEntries()->unit, newest);
+}
+
+TEST_F(StoreTest, PruneKeepsWhatIsInForce) {
+  auto store = OpenStore();
+  for (const std::uint16_t n : std::initializer_list<std::uint16_t>{37, 38}) {
+    test::ExpectDone(store->Commit(
+        std::vector<Row>{ParameterRow{{7}, Axis::kPhi, Parameter::kRepeat, n, Origin::kTuning},
+                         Tuned(n, 0.5), EnableRow{{1}, n == 37, "bent"}},
+        {n}));
+  }
+  EXPECT_EQ(PruneAll(*store, kEight), 3u);
+  auto reader = OpenReader();
+  ASSERT_EQ(reader->Parameters({7}, 9)->size(), 1u);
+  EXPECT_EQ(reader->Parameters({7}, 9)->at(0).row.value, 38);
+  ASSERT_EQ(reader->Tunings({7}, 9)->size(), 1u);
+  EXPECT_EQ(reader->Tunings({7}, 9)->at(0).row.critical, 38);
+  EXPECT_EQ(reader->Units(UnitId{1}, 9)->at(0).reason, "bent");
+}
+
+TEST_F(StoreTest, PruneLooksAtNoMoreRowsForMotionsThatFollow) {
+  const auto instructions = [this](std::uint16_t later) {
+    const std::string path = folder_ / ("later" + std::to_string(later) + ".db");
+    auto store = std::move(*Store::Open(path));
+    constexpr std::uint32_t kUnitsHomed = 50;
+    std::vector<Row> rows;
+    const auto move = [&rows](std::uint32_t unit, std::uint16_t number, IntentEnd end) {
+      rows.emplace_back(Intent(unit, unit, number, {0, 0}, {1, 1}));
+      rows.emplace_back(IntentEndRow{{unit}, {number}, end});
+    };
+    for (std::uint32_t unit = 1; unit <= kUnitsHomed; ++unit) move(unit, 1, IntentEnd::kHomed);
+    test::ExpectDone(store->Commit(rows, kEight));
+    rows.clear();
+    for (std::uint16_t number = 2; number < 2 + later; ++number)
+      for (std::uint32_t unit = 1; unit <= kUnitsHomed; ++unit)
+        move(unit, number, IntentEnd::kArrived);
+    test::ExpectDone(store->Commit(rows, kNine));
+    EXPECT_EQ(PruneAll(*store, kNine), 0u);
+    return store->counters().prune_instructions;
+  };
+  const std::uint64_t few = instructions(2);
+  EXPECT_GT(few, 0u);
+  EXPECT_EQ(instructions(100), few);
 }
 
 TEST(OldBefore, AStepOfTheWallClockMakesNothingOld) {
