@@ -1,6 +1,7 @@
 #include "daemon/store/store_copy.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -45,9 +46,33 @@ Status Sync(const std::string& path, int flags) {
   return {};
 }
 
-Status SyncFolder(const std::string& path) {
+std::string FolderOf(const std::string& path) {
   const std::string folder = std::filesystem::path(path).parent_path();
-  return Sync(folder.empty() ? "." : folder, O_DIRECTORY);
+  return folder.empty() ? "." : folder;
+}
+
+Status SyncFolder(const std::string& path) { return Sync(FolderOf(path), O_DIRECTORY); }
+
+/// The file belongs to whom its folder belongs to, with its rights: a daemon that is another user
+/// than the one who restores can write it.
+Status GiveToFolder(const std::string& path) {
+  struct stat folder {};
+  if (::stat(FolderOf(path).c_str(), &folder) != 0)
+    return FailSystem(FolderOf(path), "status", errno);
+  // The folder's owner may have put a link there, to a file that he may not have.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+  if (descriptor < 0) return FailSystem(path, "open", errno);
+  struct stat file {};
+  int failed = ::fstat(descriptor, &file) == 0 ? 0 : errno;
+  if (failed == 0 && (!S_ISREG(file.st_mode) || file.st_nlink != 1)) failed = EMLINK;
+  if (failed == 0 && ::geteuid() == 0 && ::fchown(descriptor, folder.st_uid, folder.st_gid) != 0)
+    failed = errno;
+  if (failed == 0 && (::geteuid() == 0 || ::geteuid() == file.st_uid) &&
+      ::fchmod(descriptor, folder.st_mode & 0666) != 0)
+    failed = errno;
+  ::close(descriptor);
+  if (failed != 0) return FailSystem(path, "give to the owner of the folder", failed);
+  return {};
 }
 
 /// Copies all pages in one read transaction. In smaller pieces, each commit of the daemon would
@@ -100,6 +125,7 @@ Status Copy(const std::string& from, const std::string& to, Afterwards afterward
     FOCALFLEET_TRY(afterwards(*target));
   }
   if (afterwards != nullptr) FOCALFLEET_TRY(CheckStore(to, options));
+  if (afterwards != nullptr) FOCALFLEET_TRY(GiveToFolder(to));
   return Sync(to, 0);
 }
 
@@ -142,6 +168,7 @@ Status BackUpStore(const std::string& from, const std::string& to, const StoreOp
 Status RestoreStore(const std::string& backup, const std::string& store,
                     const StoreOptions& options) {
   FOCALFLEET_TRY_ASSIGN(const auto lock, LockFile::Acquire(store + ".lock"));
+  FOCALFLEET_TRY(GiveToFolder(store + ".lock"));
   return CopyAtOnce(backup, store, MakeReady, options);
 }
 

@@ -21,8 +21,9 @@ Status BackUpStore(const std::string& from, const std::string& to,
                    const StoreOptions& options = {});
 
 /// `store` is a store again, as `backup` was. Numbers of moves go on far from those that the backup
-/// gave out, because units may hold moves of the time since. Errors: as BackUpStore; kRefused:
-/// `store` or its write-ahead log exists, or a daemon has it.
+/// gave out, because units may hold moves of the time since. The file and its lock have the rights
+/// of their folder, and as root its owner and group. Errors: as BackUpStore; kRefused: `store` or
+/// its write-ahead log exists, or a daemon has it.
 Status RestoreStore(const std::string& backup, const std::string& store,
                     const StoreOptions& options = {});
 

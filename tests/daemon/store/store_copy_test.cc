@@ -2,6 +2,8 @@
 #include "daemon/store/store_copy.h"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <fstream>
@@ -112,6 +114,27 @@ TEST_F(StoreTest, NothingIsRestoredBesideALogOfAnotherStore) {
     EXPECT_EQ(error.code, ErrorCode::kRefused);
     EXPECT_THAT(error.text, HasSubstr("fleet.db" + suffix + " is there already"));
     std::filesystem::remove(Path() + suffix);
+  }
+}
+
+TEST_F(StoreTest, ARestoredStoreBelongsToTheOwnerOfItsFolder) {
+  test::ExpectDone(OpenStore()->Commit(Batch(1, kSerials), kEight));
+  const std::string folder = folder_ / "daemon";
+  ASSERT_TRUE(std::filesystem::create_directory(folder));
+  // Only root can give a file away; for all others the owner stays.
+  const bool root = ::geteuid() == 0;
+  const uid_t user = root ? 12345 : ::geteuid();
+  const gid_t group = root ? 12346 : ::getegid();
+  ASSERT_EQ(::chown(folder.c_str(), user, group), 0);
+  ASSERT_EQ(::chmod(folder.c_str(), 0770), 0);
+  const std::string store = folder + "/fleet.db";
+  test::ExpectDone(RestoreStore(Path(), store));
+  for (const std::string& path : {store, store + ".lock"}) {
+    struct stat file {};
+    ASSERT_EQ(::stat(path.c_str(), &file), 0);
+    EXPECT_EQ(file.st_uid, user) << path;
+    EXPECT_EQ(file.st_gid, group) << path;
+    EXPECT_EQ(file.st_mode & 0777u, 0660u) << path;
   }
 }
 
