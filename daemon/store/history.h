@@ -13,7 +13,7 @@
 namespace focalfleet {
 
 /// From `since` until just before `until`.
-/// What a piece of pruning did.
+/// The work of a piece of pruning.
 struct Pruned {
   std::uint64_t rows = 0;  // that are gone
   bool more = false;       // the round is not over

@@ -41,7 +41,7 @@ constexpr Table kTables[] = {
     {"SELECT id, 0, first_ns >= ?1, last_ns < ?1 AND state = 2 FROM open_alarm "
      "WHERE id > ?2 AND ?3 IS NOT NULL ORDER BY id LIMIT ?4",
      "DELETE FROM open_alarm WHERE id = ?1"},
-    // What is in force stays: who set it, when, and what was measured.
+    // Entries in force stay: who set them, when, and what was measured.
     {"SELECT entry, 0, at_ns >= ?1, CASE WHEN at_ns >= ?1 THEN 0 ELSE NOT EXISTS(SELECT 1 FROM "
      "parameter AS now WHERE now.serial = old.serial AND now.axis = old.axis AND "
      "now.parameter = old.parameter AND now.value = old.value AND now.origin = old.origin AND "

@@ -119,7 +119,7 @@ Status Copy(const std::string& from, const std::string& to, Afterwards afterward
   }
   FOCALFLEET_TRY(CheckStore(to, options));
   if (afterwards != nullptr) {
-    // What was checked is changed, and its checksums with it. A wrong value would look right.
+    // The change sets checksums anew. A wrong value that was not found before would look right.
     FOCALFLEET_TRY_ASSIGN(const auto target,
                           Connection::Open(to, Connection::Mode::kWrite, options.vfs, wait_ms));
     FOCALFLEET_TRY(afterwards(*target));
