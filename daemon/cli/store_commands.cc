@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <system_error>
+
 #include "daemon/cli/command_line.h"
 #include "daemon/store/store_copy.h"
-#include "daemon/store/store_health.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -20,9 +22,8 @@ struct CopyOptions {
 };
 
 ExitCode RunCheck(const Context& context, const CheckOptions& options) {
-  const auto health = InspectHealth(options.file);
+  const auto health = CheckStore(options.file);
   if (!health) return Report(context, health.error());
-  if (const Status sound = CheckStore(options.file); !sound) return Report(context, sound.error());
   if (context.json)
     PrintJson({{"file", options.file},
                {"version", health->version},
@@ -39,12 +40,12 @@ ExitCode RunCheck(const Context& context, const CheckOptions& options) {
 ExitCode Answer(const Context& context, const CopyOptions& options, const char* what,
                 const Status& done) {
   if (!done) return Report(context, done.error());
-  const auto health = InspectHealth(options.to);
-  if (!health) return Report(context, health.error());
-  if (context.json)
-    PrintJson({{"from", options.from}, {"to", options.to}, {"bytes", health->bytes}});
-  Say(context, fmt::format("{}: {} of {}, checked, {} bytes", options.to, what, options.from,
-                           health->bytes));
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(options.to, error);
+  if (error) return Report(context, {ErrorCode::kUnavailable, options.to + ": " + error.message()});
+  if (context.json) PrintJson({{"from", options.from}, {"to", options.to}, {"bytes", bytes}});
+  Say(context,
+      fmt::format("{}: {} of {}, checked, {} bytes", options.to, what, options.from, bytes));
   return ExitCode::kOk;
 }
 

@@ -75,7 +75,9 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Section("store", "The record of every axis, which survives power cuts and kills");
   visit->Path("path", &c->store.path, "The store, an SQLite file; one daemon at a time");
   visit->Whole("keep_days", &c->store.keep_days, {0, 36'500},
-               "Days after which past moves, measurements and alarms go; 0: they stay");
+               "Days after which history goes: past moves, configurations, measurements, "
+               "orientations, alarms, and changes of units, axes, parameters and tunings; "
+               "0: all of it stays");
   visit->Section("control", "The socket of the command line");
   visit->Path("socket", &c->control.socket,
               "Control socket for the command line; owner and group may use it");

@@ -10,14 +10,14 @@ Result<std::function<bool()>> PruningOf(Store* store, std::uint32_t keep_days) {
   FOCALFLEET_TRY_ASSIGN(const WallTime newest, store->Newest());
   const auto opened = std::chrono::steady_clock::now();
   return [store, keep_days, newest, opened] {
-    constexpr std::uint32_t kRowsAtOnce = 2000;  // some 10 ms
+    constexpr std::uint32_t kRowsAtOnce = 2000;  // looked at; some 10 ms
     const std::chrono::duration<double> open = std::chrono::steady_clock::now() - opened;
     const WallTime before = OldBefore(
         {.now = WallTime::Now(), .newest = newest, .open_s = open.count(), .keep_days = keep_days});
     if (before.ns <= 0) return false;
     const auto gone = store->Prune(before, kRowsAtOnce);
     if (!gone) spdlog::warn("old history stays for now: {}", gone.error().text);
-    return gone.value_or(0) > 0;
+    return gone && gone->more;
   };
 }
 

@@ -13,6 +13,12 @@
 namespace focalfleet {
 
 /// From `since` until just before `until`.
+/// The work of a piece of pruning.
+struct Pruned {
+  std::uint64_t rows = 0;  // that are gone
+  bool more = false;       // the round is not over
+};
+
 struct Period {
   WallTime since{std::numeric_limits<std::int64_t>::min()};
   WallTime until{std::numeric_limits<std::int64_t>::max()};

@@ -20,7 +20,8 @@ class Sum {
     if (type == SQLITE_INTEGER) {
       bits = static_cast<std::uint64_t>(sqlite3_value_int64(value));
     } else if (type == SQLITE_FLOAT) {
-      const double real = sqlite3_value_double(value);
+      // SQLite stores -0.0 as 0, and returns it without the sign.
+      const double real = sqlite3_value_double(value) + 0.0;
       std::memcpy(&bits, &real, sizeof bits);
     } else if (type != SQLITE_NULL) {
       const void* const bytes = sqlite3_value_blob(value);

@@ -32,6 +32,14 @@ Status RowWriter::Write(const Row& row) {
   return std::visit([this](const auto& what) { return Put(what); }, row);
 }
 
+Status RowWriter::Finish() {
+  if (opened_ == 0) return {};
+  Statement& s = statements_[Sql::kAddMeta];
+  s.BindText(1, "open_intents");
+  s.Bind(2, opened_);
+  return s.Run();
+}
+
 Status RowWriter::Put(const VectorRow& row) {
   for (const Axis axis : kAxes) {
     // Motions are kept in intent, exposures in measurement. Vectors set in any other way would
@@ -89,7 +97,11 @@ Status RowWriter::Put(const IntentRow& row) {
   s.Bind(11, row.hull[1].low);
   s.Bind(12, row.hull[1].high);
   s.Bind(13, now_.ns);
-  return s.Run();
+  sqlite3* const db = sqlite3_db_handle(s.get());
+  sqlite3_set_last_insert_rowid(db, 0);  // stays where an open row is updated
+  FOCALFLEET_TRY(s.Run());
+  if (sqlite3_last_insert_rowid(db) != 0) ++opened_;
+  return {};
 }
 
 Status RowWriter::Put(const IntentEndRow& row) {
@@ -98,7 +110,9 @@ Status RowWriter::Put(const IntentEndRow& row) {
   s.Bind(2, row.move.value);
   s.Bind(3, Code(row.end));
   s.Bind(4, now_.ns);
-  return s.Run();
+  FOCALFLEET_TRY(s.Run());
+  opened_ -= sqlite3_changes64(sqlite3_db_handle(s.get()));
+  return {};
 }
 
 Status RowWriter::Put(const BindingRow& row) {

@@ -19,6 +19,8 @@ class RowWriter {
   /// The row is in the open transaction. Pre: fleet/row_check.h finds no flaw in it. Errors: as
   /// Statement::Run.
   Status Write(const Row& row);
+  /// The store counts its open moves as they are after all rows. Call it last.
+  Status Finish();
 
  private:
   Status Put(const VectorRow& row);
@@ -44,6 +46,7 @@ class RowWriter {
 
   Statements& statements_;
   WallTime now_;
+  std::int64_t opened_ = 0;  // moves, less those that ended
 };
 
 }  // namespace focalfleet::store_internal

@@ -384,6 +384,11 @@ UPDATE meta SET checksum = row_checksum(key, value);
 ALTER TABLE intent ADD COLUMN checksum INTEGER;  -- NULL: it ended before rows had checksums
 UPDATE intent SET checksum = row_checksum(configuration, unit_id, serial, move, theta_from,
   phi_from, theta_to, phi_to, theta_low, theta_high, phi_low, phi_high) WHERE end IS NULL;
+-- Pruning asks for each homing whether its unit has a later one.
+CREATE INDEX intent_homed ON intent(unit_id, entry) WHERE end = 5;
+-- Checksums guard what a row holds, not that it is there; a start is not to read all motions.
+INSERT INTO meta(key, value, checksum) SELECT 'open_intents', count(*),
+  row_checksum('open_intents', count(*)) FROM intent WHERE end IS NULL;
 )sql";
 
 constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4, kVersion5,

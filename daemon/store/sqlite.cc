@@ -87,6 +87,21 @@ Result<std::int64_t> Connection::Integer(const char* sql) {
   return sqlite3_column_int64(statement.get(), 0);
 }
 
+Result<std::string> Connection::QuickCheck(std::string_view table) {
+  std::string sql = "PRAGMA quick_check";
+  if (!table.empty()) sql += "('" + std::string(table) + "')";
+  FOCALFLEET_TRY_ASSIGN(Statement check, Prepare(sql));
+  const auto row = check.Next();
+  if (!row) return tl::unexpected<Error>(Named(row.error()));
+  const auto* text = *row ? sqlite3_column_text(check.get(), 0) : nullptr;
+  if (text == nullptr) return std::string("quick_check finds nothing to say");
+  std::string finding(static_cast<const char*>(static_cast<const void*>(text)));
+  // A read that fails is a finding, too, but the file may be sound.
+  if (finding.find("unable to get the page") != std::string::npos)
+    return tl::unexpected<Error>(Named({ErrorCode::kUnavailable, finding}));
+  return finding == "ok" ? std::string() : finding;
+}
+
 void Connection::Rollback() {
   // After some errors SQLite has undone the transaction by itself; then this does nothing.
   if (sqlite3_get_autocommit(db()) == 0) static_cast<void>(rollback_.Run());

@@ -81,6 +81,8 @@ class Connection {
   Status Execute(const char* sql);
   /// The one integer that `sql` yields.
   Result<std::int64_t> Integer(const char* sql);
+  /// The first finding of quick_check; empty: none. `table` is one with its indices; empty: all.
+  Result<std::string> QuickCheck(std::string_view table = {});
   /// An open transaction is undone, unless there is no memory for that. Call it before a
   /// transaction, too: one that could not be undone is undone then.
   void Rollback();

@@ -119,6 +119,8 @@ constexpr const char* kRaiseMeta =
 constexpr const char* kSetMeta =
     "INSERT INTO meta(key, value, checksum) VALUES(?1, ?2, row_checksum(?1, ?2)) "
     "ON CONFLICT(key) DO UPDATE SET value = ?2, checksum = excluded.checksum";
+constexpr const char* kAddMeta =
+    "UPDATE meta SET value = value + ?2, checksum = row_checksum(key, value + ?2) WHERE key = ?1";
 
 }  // namespace
 
@@ -153,6 +155,7 @@ Result<std::unique_ptr<Statements>> PrepareAll(Connection& connection) {
       {Sql::kModelChange, kModelChange},
       {Sql::kRaiseMeta, kRaiseMeta},
       {Sql::kSetMeta, kSetMeta},
+      {Sql::kAddMeta, kAddMeta},
   };
   static_assert(std::size(list) == kSqlCount);
   for (const auto& [which, text] : list) {

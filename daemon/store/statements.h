@@ -37,8 +37,9 @@ enum class Sql : std::uint8_t {
   kModelChange,
   kRaiseMeta,
   kSetMeta,
+  kAddMeta,
 };
-inline constexpr std::size_t kSqlCount = static_cast<std::size_t>(Sql::kSetMeta) + 1;
+inline constexpr std::size_t kSqlCount = static_cast<std::size_t>(Sql::kAddMeta) + 1;
 
 class Statements {
  public:

@@ -6,21 +6,17 @@
 
 #include "daemon/store/cells.h"
 #include "daemon/store/lock_file.h"
+#include "daemon/store/pruner.h"
 #include "daemon/store/row_writer.h"
 #include "daemon/store/schema.h"
 #include "daemon/store/sqlite.h"
 #include "daemon/store/statements.h"
-#include "protocol/base/limits.h"
 
 namespace focalfleet {
 
 using namespace store_internal;
 
 namespace {
-
-/// Rows of a table that one call of Prune looks at. Those that stay for ever, the last homing of
-/// each unit, are kUnits at most.
-constexpr std::int64_t kPruneWindow = 4 * std::int64_t{limits::kUnits};
 
 /// The path by which all names of this file lock the same lock.
 std::string Canonical(const std::string& path) {
@@ -64,7 +60,7 @@ WallTime OldBefore(const HistoryAge& age) {
   return WallTime{now_ns - age.keep_days * kDayNs};
 }
 
-Store::Store() = default;
+Store::Store() : pruner_(std::make_unique<Pruner>()) {}
 Store::~Store() = default;
 
 Result<std::unique_ptr<Store>> Store::Open(const std::string& path, const StoreOptions& options) {
@@ -124,6 +120,7 @@ Status Store::Commit(std::span<const Row> rows, WallTime now, std::size_t* refus
     if (!std::holds_alternative<IntentEndRow>(rows[k])) continue;
     if (auto written = write(k); !written) return Rollback(written.error());
   }
+  if (auto counted = writer.Finish(); !counted) return Rollback(counted.error());
   if (auto done = (*statements_)[Sql::kCommit].Run(); !done) return Rollback(done.error());
   ++counters_.transactions;
   counters_.rows += rows.size();
@@ -140,63 +137,17 @@ Result<WallTime> Store::Newest() {
   return WallTime{ns};
 }
 
-Result<std::uint64_t> Store::Prune(WallTime before, std::uint32_t rows_max) {
-  // Keys ascend with time, so only the first kPruneWindow rows of a table are looked at: a look at
-  // all of two million motions takes a second.
-  constexpr const char* kDelete[] = {
-      // The last homing of a unit stays: a model from before it does not hold for this unit.
-      "DELETE FROM intent WHERE entry IN (SELECT entry FROM (SELECT entry, unit_id, end, ended_ns "
-      "FROM intent ORDER BY entry LIMIT ?3) AS old WHERE end IS NOT NULL AND ended_ns < ?1 AND "
-      "(end <> 5 OR EXISTS(SELECT 1 FROM intent AS later WHERE later.unit_id = old.unit_id AND "
-      "later.end = 5 AND later.entry > old.entry)) LIMIT ?2)",
-      "DELETE FROM configuration WHERE id IN (SELECT id FROM (SELECT id, state, changed_ns FROM "
-      "configuration ORDER BY id LIMIT ?3) WHERE changed_ns < ?1 AND state >= 3 AND "
-      "id <> (SELECT max(id) FROM configuration) LIMIT ?2)",
-      "DELETE FROM measurement WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM (SELECT "
-      "exposure, unit_id, at_ns FROM measurement ORDER BY exposure, unit_id LIMIT ?3) WHERE "
-      "at_ns < ?1 LIMIT ?2)",
-      "DELETE FROM orientation WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM (SELECT "
-      "exposure, unit_id, at_ns FROM orientation ORDER BY exposure, unit_id LIMIT ?3) WHERE "
-      "at_ns < ?1 LIMIT ?2)",
-      "DELETE FROM alarm WHERE id IN (SELECT id FROM (SELECT id, at_ns FROM alarm ORDER BY id "
-      "LIMIT "
-      "?3) WHERE at_ns < ?1 LIMIT ?2)",
-      "DELETE FROM open_alarm WHERE id IN (SELECT id FROM (SELECT id, last_ns, state FROM "
-      "open_alarm ORDER BY id LIMIT ?3) WHERE last_ns < ?1 AND state = 2 LIMIT ?2)",
-      "DELETE FROM parameter_history WHERE entry IN (SELECT entry FROM (SELECT entry, at_ns FROM "
-      "parameter_history ORDER BY entry LIMIT ?3) WHERE at_ns < ?1 LIMIT ?2)",
-      "DELETE FROM tuning_history WHERE entry IN (SELECT entry FROM (SELECT entry, at_ns FROM "
-      "tuning_history ORDER BY entry LIMIT ?3) WHERE at_ns < ?1 LIMIT ?2)",
-      // The next two keep entries since the first model: these say for which units a model holds.
-      "DELETE FROM axis_history WHERE entry IN (SELECT entry FROM (SELECT entry, at_ns FROM "
-      "axis_history ORDER BY entry LIMIT ?3) WHERE at_ns < ?1 AND at_ns < (SELECT "
-      "coalesce(min(at_ns), ?1) FROM model_change) LIMIT ?2)",
-      "DELETE FROM unit_history WHERE entry IN (SELECT entry FROM (SELECT entry, at_ns FROM "
-      "unit_history ORDER BY entry LIMIT ?3) WHERE at_ns < ?1 AND at_ns < (SELECT "
-      "coalesce(min(at_ns), ?1) FROM model_change) LIMIT ?2)",
+Result<Pruned> Store::Prune(WallTime before, std::uint32_t rows_max) {
+  const auto fail = [this](const Error& why) {
+    pruner_->Restart();
+    return tl::unexpected<Error>(Rollback(why).error());
   };
-  static_assert(IntentEnd::kHomed == IntentEnd{5});
-  static_assert(ConfigurationState::kDone == ConfigurationState{3});
-  std::uint64_t deleted = 0;
   connection_->Rollback();
-  if (auto begun = (*statements_)[Sql::kBegin].Run(); !begun) {
-    return tl::unexpected<Error>(Rollback(begun.error()).error());
-  }
-  for (const char* sql : kDelete) {
-    auto statement = connection_->Prepare(sql);
-    if (!statement) return tl::unexpected<Error>(Rollback(statement.error()).error());
-    statement->Bind(1, before.ns);
-    statement->Bind(2, rows_max);
-    statement->Bind(3, kPruneWindow);
-    if (auto done = statement->Run(); !done) {
-      return tl::unexpected<Error>(Rollback(done.error()).error());
-    }
-    deleted += static_cast<std::uint64_t>(sqlite3_changes64(connection_->db()));
-  }
-  if (auto done = (*statements_)[Sql::kCommit].Run(); !done) {
-    return tl::unexpected<Error>(Rollback(done.error()).error());
-  }
-  return deleted;
+  if (auto begun = (*statements_)[Sql::kBegin].Run(); !begun) return fail(begun.error());
+  auto pruned = pruner_->Step(*connection_, before, rows_max, &counters_.prune_instructions);
+  if (!pruned) return fail(pruned.error());
+  if (auto done = (*statements_)[Sql::kCommit].Run(); !done) return fail(done.error());
+  return pruned;
 }
 
 }  // namespace focalfleet

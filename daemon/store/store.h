@@ -17,6 +17,7 @@
 #include <string>
 
 #include "daemon/clock/wall_time.h"
+#include "daemon/store/history.h"
 #include "daemon/store/store_options.h"
 #include "fleet/records.h"
 #include "protocol/base/result.h"
@@ -26,13 +27,15 @@ namespace focalfleet {
 namespace store_internal {
 class Connection;
 class LockFile;
+class Pruner;
 class Statements;
 }  // namespace store_internal
 
 struct StoreCounters {
   std::uint64_t transactions = 0;
   std::uint64_t rows = 0;
-  std::uint64_t failed = 0;  // transactions that were rolled back
+  std::uint64_t failed = 0;              // transactions that were rolled back
+  std::uint64_t prune_instructions = 0;  // of SQLite
 };
 
 /// Facts by which history is old.
@@ -75,11 +78,13 @@ class Store {
   /// The time of the newest row of the history; 0: there is none.
   Result<WallTime> Newest();
 
-  /// Ended moves, configurations, measurements, alarms and histories before `before` are gone, at
-  /// most `rows_max` of each table, so that the transaction stays short. Rows that a start of the
-  /// daemon reads stay: what the coordinator loads, and what says for which units a model holds.
-  /// Texts of models stay. The result is the number of rows that are gone.
-  Result<std::uint64_t> Prune(WallTime before, std::uint32_t rows_max);
+  /// A piece of all history is rid of what is from before `before`: ended moves, configurations,
+  /// measurements, orientations, alarms, histories of units, axes, parameters and tunings.
+  /// `rows_max` rows are looked at, so that the transaction stays short. The next call goes on
+  /// where this one stopped. Rows that a start of the daemon reads stay: what the coordinator
+  /// loads, and what says for which units a model holds. The newest history of each unit, and of
+  /// parameters and tunings in force, stays, as do texts of models.
+  Result<Pruned> Prune(WallTime before, std::uint32_t rows_max);
 
   [[nodiscard]] const StoreCounters& counters() const { return counters_; }
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -93,6 +98,7 @@ class Store {
   std::unique_ptr<store_internal::LockFile> lock_;
   std::unique_ptr<store_internal::Connection> connection_;
   std::unique_ptr<store_internal::Statements> statements_;
+  std::unique_ptr<store_internal::Pruner> pruner_;
   StoreCounters counters_;
 };
 

@@ -1,6 +1,7 @@
 #include "daemon/store/store_copy.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -26,7 +27,7 @@ tl::unexpected<Error> FailSystem(const std::string& path, const char* what, int 
 }
 
 Status CheckFree(const std::string& path) {
-  for (const char* const suffix : {"", "-wal"}) {
+  for (const char* const suffix : {"", "-wal", "-journal"}) {
     std::error_code error;
     if (std::filesystem::symlink_status(path + suffix, error).type() !=
         std::filesystem::file_type::not_found)
@@ -45,9 +46,33 @@ Status Sync(const std::string& path, int flags) {
   return {};
 }
 
-Status SyncFolder(const std::string& path) {
+std::string FolderOf(const std::string& path) {
   const std::string folder = std::filesystem::path(path).parent_path();
-  return Sync(folder.empty() ? "." : folder, O_DIRECTORY);
+  return folder.empty() ? "." : folder;
+}
+
+Status SyncFolder(const std::string& path) { return Sync(FolderOf(path), O_DIRECTORY); }
+
+/// The file belongs to whom its folder belongs to, with its rights: a daemon that is another user
+/// than the one who restores can write it.
+Status GiveToFolder(const std::string& path) {
+  struct stat folder {};
+  if (::stat(FolderOf(path).c_str(), &folder) != 0)
+    return FailSystem(FolderOf(path), "status", errno);
+  // The folder's owner may have put a link there, to a file that he may not have.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+  if (descriptor < 0) return FailSystem(path, "open", errno);
+  struct stat file {};
+  int failed = ::fstat(descriptor, &file) == 0 ? 0 : errno;
+  if (failed == 0 && (!S_ISREG(file.st_mode) || file.st_nlink != 1)) failed = EMLINK;
+  if (failed == 0 && ::geteuid() == 0 && ::fchown(descriptor, folder.st_uid, folder.st_gid) != 0)
+    failed = errno;
+  if (failed == 0 && (::geteuid() == 0 || ::geteuid() == file.st_uid) &&
+      ::fchmod(descriptor, folder.st_mode & 0666) != 0)
+    failed = errno;
+  ::close(descriptor);
+  if (failed != 0) return FailSystem(path, "give to the owner of the folder", failed);
+  return {};
 }
 
 /// Copies all pages in one read transaction. In smaller pieces, each commit of the daemon would
@@ -91,9 +116,16 @@ Status Copy(const std::string& from, const std::string& to, Afterwards afterward
     FOCALFLEET_TRY(CopyPages(*source, *target));
     // A backup is one file, whatever program copies it on.
     FOCALFLEET_TRY(target->Execute("PRAGMA journal_mode = DELETE"));
-    if (afterwards != nullptr) FOCALFLEET_TRY(afterwards(*target));
   }
   FOCALFLEET_TRY(CheckStore(to, options));
+  if (afterwards != nullptr) {
+    // The change sets checksums anew. A wrong value that was not found before would look right.
+    FOCALFLEET_TRY_ASSIGN(const auto target,
+                          Connection::Open(to, Connection::Mode::kWrite, options.vfs, wait_ms));
+    FOCALFLEET_TRY(afterwards(*target));
+  }
+  if (afterwards != nullptr) FOCALFLEET_TRY(CheckStore(to, options));
+  if (afterwards != nullptr) FOCALFLEET_TRY(GiveToFolder(to));
   return Sync(to, 0);
 }
 
@@ -116,16 +148,17 @@ Status CopyAtOnce(const std::string& from, const std::string& to, Afterwards aft
 
 }  // namespace
 
-Status CheckStore(const std::string& path, const StoreOptions& options) {
-  FOCALFLEET_TRY_ASSIGN(const StoreHealth health, InspectHealth(path, options));
+Result<StoreHealth> CheckStore(const std::string& path, const StoreOptions& options) {
+  FOCALFLEET_TRY_ASSIGN(StoreHealth health, InspectHealth(path, options));
   if (!health.flaw.empty()) return Fail(ErrorCode::kInvalid, "store " + path + ": " + health.flaw);
+  if (health.version == 0) return Fail(ErrorCode::kInvalid, "store " + path + ": nothing is in it");
   // Older schemas lack columns; the daemon carries them over before it loads.
-  if (health.version < health.version_expected) return {};
+  if (health.version < health.version_expected) return health;
   FOCALFLEET_TRY_ASSIGN(const auto connection,
                         Connection::Open(path, Connection::Mode::kRead, options.vfs,
                                          static_cast<int>(options.busy_wait.count())));
   FOCALFLEET_TRY(LoadFleet(*connection));
-  return {};
+  return health;
 }
 
 Status BackUpStore(const std::string& from, const std::string& to, const StoreOptions& options) {
@@ -135,6 +168,7 @@ Status BackUpStore(const std::string& from, const std::string& to, const StoreOp
 Status RestoreStore(const std::string& backup, const std::string& store,
                     const StoreOptions& options) {
   FOCALFLEET_TRY_ASSIGN(const auto lock, LockFile::Acquire(store + ".lock"));
+  FOCALFLEET_TRY(GiveToFolder(store + ".lock"));
   return CopyAtOnce(backup, store, MakeReady, options);
 }
 

@@ -28,14 +28,9 @@ Result<std::string> FlawOf(const Connection& connection, const Error& error) {
 
 /// The first finding of quick_check; empty: the file is sound.
 Result<std::string> FirstFlaw(Connection& connection) {
-  auto check = connection.Prepare("PRAGMA quick_check(1)");
-  if (!check) return FlawOf(connection, check.error());
-  const auto row = check->Next();
-  if (!row) return FlawOf(connection, connection.Named(row.error()));
-  const auto* text = *row ? sqlite3_column_text(check->get(), 0) : nullptr;
-  if (text == nullptr) return std::string("quick_check finds nothing to say");
-  std::string finding(static_cast<const char*>(static_cast<const void*>(text)));
-  return finding == "ok" ? std::string() : finding;
+  auto finding = connection.QuickCheck();
+  if (!finding) return FlawOf(connection, finding.error());
+  return finding;
 }
 
 }  // namespace

@@ -324,9 +324,10 @@ Result<std::vector<UnitId>> StoreReader::CountedAnewSince(WallTime since) {
       "SELECT unit_id FROM intent WHERE end = 5 AND ended_ns > ?2 "
       "UNION SELECT unit_id FROM axis_history JOIN unit USING (serial) "
       "WHERE axis_history.origin IN (3, 8) AND axis_history.at_ns > ?2 "
-      "UNION SELECT unit_id FROM unit_history AS now WHERE at_ns > ?2 AND serial <> 0 AND EXISTS("
-      "SELECT 1 FROM unit_history AS before WHERE before.unit_id = now.unit_id AND "
-      "before.entry < now.entry AND before.serial NOT IN (0, now.serial)) "
+      "UNION SELECT unit_id FROM unit_history AS now WHERE at_ns > ?2 AND serial <> 0 AND "
+      "serial <> (SELECT before.serial FROM unit_history AS before WHERE "
+      "before.unit_id = now.unit_id AND before.entry < now.entry AND before.serial <> 0 "
+      "ORDER BY before.entry DESC LIMIT 1) "
       "ORDER BY unit_id LIMIT ?1",
       limits::kUnits, {since.ns},
       [](Cells& cells) { return UnitId{cells.Whole<std::uint32_t>(0)}; });

@@ -2,6 +2,8 @@
 #include "daemon/store/store_copy.h"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <fstream>
@@ -26,6 +28,11 @@ Error ErrorOf(const Status& status) {
   return status ? Error{static_cast<ErrorCode>(99), "success"} : status.error();
 }
 
+Status Sound(const std::string& path) {
+  const auto health = CheckStore(path);
+  return health ? Status() : tl::unexpected<Error>(health.error());
+}
+
 std::size_t FilesIn(const std::filesystem::path& folder) {
   const std::filesystem::directory_iterator files(folder);
   return static_cast<std::size_t>(std::distance(begin(files), end(files)));
@@ -46,7 +53,7 @@ TEST_F(StoreTest, ABackupBesideTheWriterHoldsAWholeBatch) {
     const std::string copy = folder_ / ("backup" + std::to_string(round) + ".db");
     const std::uint32_t before = committed;
     test::ExpectDone(BackUpStore(Path(), copy));
-    test::ExpectDone(CheckStore(copy));
+    test::ExpectDone(Sound(copy));
     EXPECT_FALSE(std::filesystem::exists(copy + "-wal")) << "a backup is one file";
     const auto fleet = (*Store::Open(copy))->Load();
     ASSERT_TRUE(fleet) << fleet.error().text;
@@ -79,6 +86,56 @@ TEST_F(StoreTest, ADamagedStoreIsNoBackup) {
   EXPECT_EQ(FilesIn(folder_ / "."), files);
   std::ofstream(Path()) << "no store";
   EXPECT_EQ(ErrorOf(CheckStore(Path())).code, ErrorCode::kInvalid);
+}
+
+TEST_F(StoreTest, AnEmptyFileIsNoStore) {
+  std::ofstream(Path()).flush();
+  const Error error = ErrorOf(CheckStore(Path()));
+  EXPECT_EQ(error.code, ErrorCode::kInvalid);
+  EXPECT_THAT(error.text, HasSubstr("nothing is in it"));
+  EXPECT_EQ(ErrorOf(BackUpStore(Path(), folder_ / "backup.db")).code, ErrorCode::kInvalid);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "backup.db"));
+}
+
+TEST_F(StoreTest, ADamagedBackupIsNotRestoredAsASoundStore) {
+  test::ExpectDone(OpenStore()->Commit(std::vector<Row>{NextMoveRow{{1000}}}, kEight));
+  Sql("UPDATE meta SET value = 1001 WHERE key = 'next_move'");
+  std::filesystem::rename(Path(), folder_ / "backup.db");
+  EXPECT_THAT(ErrorOf(RestoreStore(folder_ / "backup.db", Path())).text, HasSubstr("next_move"));
+  EXPECT_FALSE(std::filesystem::exists(Path()));
+}
+
+TEST_F(StoreTest, NothingIsRestoredBesideALogOfAnotherStore) {
+  test::ExpectDone(OpenStore()->Commit(Batch(1, kSerials), kEight));
+  std::filesystem::rename(Path(), folder_ / "backup.db");
+  for (const std::string suffix : {"-wal", "-journal"}) {
+    std::ofstream(Path() + suffix) << "of another store";
+    const Error error = ErrorOf(RestoreStore(folder_ / "backup.db", Path()));
+    EXPECT_EQ(error.code, ErrorCode::kRefused);
+    EXPECT_THAT(error.text, HasSubstr("fleet.db" + suffix + " is there already"));
+    std::filesystem::remove(Path() + suffix);
+  }
+}
+
+TEST_F(StoreTest, ARestoredStoreBelongsToTheOwnerOfItsFolder) {
+  test::ExpectDone(OpenStore()->Commit(Batch(1, kSerials), kEight));
+  const std::string folder = folder_ / "daemon";
+  ASSERT_TRUE(std::filesystem::create_directory(folder));
+  // Only root can give a file away; for all others the owner stays.
+  const bool root = ::geteuid() == 0;
+  const uid_t user = root ? 12345 : ::geteuid();
+  const gid_t group = root ? 12346 : ::getegid();
+  ASSERT_EQ(::chown(folder.c_str(), user, group), 0);
+  ASSERT_EQ(::chmod(folder.c_str(), 0770), 0);
+  const std::string store = folder + "/fleet.db";
+  test::ExpectDone(RestoreStore(Path(), store));
+  for (const std::string& path : {store, store + ".lock"}) {
+    struct stat file {};
+    ASSERT_EQ(::stat(path.c_str(), &file), 0);
+    EXPECT_EQ(file.st_uid, user) << path;
+    EXPECT_EQ(file.st_gid, group) << path;
+    EXPECT_EQ(file.st_mode & 0777u, 0660u) << path;
+  }
 }
 
 TEST_F(StoreTest, ARestoredStoreGoesOnWithOtherNumbersOfMoves) {
