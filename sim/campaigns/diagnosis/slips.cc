@@ -12,7 +12,10 @@ namespace {
 
 constexpr std::size_t kSlipsOfUnitMax = 40;
 constexpr double kTurnsMax = 20;
-constexpr double kBeside = 0.25;  // of a turn, either way: half of all steps by chance
+// Share of a turn by which a step may lie beside a whole number of turns, either way. Chance passes
+// half of all steps. With 0.125 one of nine slips of a unit is taken for one of the other axis;
+// with 0.5 every step passes, and steps that are none are taken again and again.
+constexpr double kBeside = 0.25;
 
 // Columns of a row, side by side: the geometry's, and the residual.
 constexpr Eigen::Index kGeometryColumns = 6, kStepColumns = kGeometryColumns + 1;
@@ -61,7 +64,8 @@ class StepRows {
     const StepProducts all = sums_[end] - sums_[begin];
     Eigen::Matrix<double, kGeometryColumns, kGeometryColumns> gram =
         all.topLeftCorner<kGeometryColumns, kGeometryColumns>();
-    constexpr double kDependent = 1e-9;  // of each column's square: the rest is rounding
+    // Share of each column's square, above rounding. Half and double of it find the same slips.
+    constexpr double kDependent = 1e-9;
     gram.diagonal() += kDependent * gram.diagonal();
     gram.diagonal().array() += 1e-300;  // a column of zeros
     const auto solver = gram.ldlt();
@@ -140,6 +144,7 @@ struct Slip {
 
 // Rows on either side that a jump is looked for by. The narrowest that shows a slip has the fewest
 // other slips within it: narrowest over threshold, Baranowski et al., J. R. Stat. Soc. B 81, 649.
+// With half of these rows eight of nine slips of a unit are found, with twice as many all nine.
 constexpr std::array<std::size_t, 3> kEitherSide = {4, 8, 16};
 
 // The likeliest slip with a likelihood ratio above e^least, by as few rows as show one.
