@@ -111,6 +111,7 @@ TEST(Ledger, DifferentAlarmsOfOneKindAreNotCalledTheSame) {
   for (int k = 0; k < 9; ++k)
     steps.ledger()->alarms().Raise(AlarmName::kRowRefused, {}, {}, "row " + std::to_string(k));
   steps.End(Seconds(0));
+  ASSERT_EQ(steps.alarms.size(), 1u);
   EXPECT_EQ(steps.alarms.back().text, "row 8 (6 of its kind in 0 s)");
 }
 
