@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "daemon/metrics/exposition.h"
+#include "daemon/metrics/metric_groups.h"
 
 namespace focalfleet {
 namespace {
@@ -114,10 +115,11 @@ void PutPower(const FleetMetrics& fleet, Exposition* out) {
              fleet.limit_W);
   out->Gauge("focalfleet_rail_power_limit_watts",
              "Limit of each rail that the newest plan was made for. 0: none.", fleet.rail_limit_W);
+  const std::vector<RailGroup> groups = GroupRails(fleet.rails);
   const auto each = [&](const char* name, const char* help, const auto& value_of) {
     out->BeginGauge(name, help);
-    for (const RailMetrics& rail : fleet.rails)
-      out->Sample("rail", rail.rail.value, value_of(rail));
+    for (const RailGroup& group : groups)
+      out->Sample("rail", std::string_view(group.label), value_of(group.all));
   };
   each("focalfleet_rail_power_predicted_watts", "Highest power of the rail, by the newest plan.",
        [](const RailMetrics& rail) { return rail.power_predicted_W; });
@@ -128,8 +130,9 @@ void PutPower(const FleetMetrics& fleet, Exposition* out) {
 }
 
 void PutBuses(const FleetMetrics& fleet, Exposition* out) {
+  const std::vector<BusGroup> groups = GroupBuses(fleet.buses);
   const auto each = [&](const auto& value_of) {
-    for (const BusMetrics& bus : fleet.buses) out->Sample("bus", bus.bus.value, value_of(bus));
+    for (const BusGroup& group : groups) out->Sample("bus", group.label, value_of(group.all));
   };
   const auto gauge = [&](const char* name, const char* help, const auto& value_of) {
     out->BeginGauge(name, help);
@@ -144,18 +147,18 @@ void PutBuses(const FleetMetrics& fleet, Exposition* out) {
   gauge("focalfleet_bus_units_answering", "Units on the bus that answer.",
         [](const BusMetrics& bus) { return AsDouble(bus.answering); });
   out->BeginGauge("focalfleet_bus_state", "State of the bus: 1 for the present one.");
-  for (const BusMetrics& bus : fleet.buses)
-    PutState(fmt::format(FMT_COMPILE("bus=\"{}\","), bus.bus.value), LinkState::kDown, bus.link,
+  for (const BusGroup& group : groups)
+    PutState(fmt::format(FMT_COMPILE("bus=\"{}\","), group.label), LinkState::kDown, group.all.link,
              out);
   gauge("focalfleet_bus_load_ratio", "Share of the last second in which the bus carried bits.",
         [](const BusMetrics& bus) { return bus.load; });
   out->BeginCounter("focalfleet_bus_frames_total", "Frames on the bus, by direction.");
-  for (const BusMetrics& bus : fleet.buses) {
+  for (const BusGroup& group : groups) {
     const auto labels = [&](const char* direction) {
-      return fmt::format(FMT_COMPILE("bus=\"{}\",direction=\"{}\""), bus.bus.value, direction);
+      return fmt::format(FMT_COMPILE("bus=\"{}\",direction=\"{}\""), group.label, direction);
     };
-    out->SampleOf(labels("sent"), AsDouble(bus.frames_sent));
-    out->SampleOf(labels("received"), AsDouble(bus.frames_received));
+    out->SampleOf(labels("sent"), AsDouble(group.all.frames_sent));
+    out->SampleOf(labels("received"), AsDouble(group.all.frames_received));
   }
   counter("focalfleet_bus_retransmits_total", "Questions that were repeated without an answer.",
           [](const BusMetrics& bus) { return bus.retransmits; });

@@ -6,6 +6,7 @@
 #include <map>
 #include <sstream>
 
+#include "daemon/metrics/metric_groups.h"
 #include "daemon/metrics/metrics_sampler.h"
 #include "fleet/hex_layout.h"
 
@@ -49,6 +50,33 @@ std::size_t SeriesOf(const std::string& page) {
   std::size_t series = 0;
   for (std::string line; std::getline(text, line);) series += line.starts_with('#') ? 0u : 1u;
   return series;
+}
+
+TEST(MetricsText, HasAtMostAThousandSeriesForAnyPlate) {
+  for (const std::uint32_t buses : {200u, 201u, 999u})
+    EXPECT_LE(SeriesOf(PageOf({.units = 20'000, .buses = buses, .rails = buses / 5})), 1000u)
+        << buses;
+}
+
+TEST(MetricsText, BusesOfOneGroupAddUpAndShowTheWorst) {
+  FleetMetrics fleet;
+  for (std::uint32_t n = 0; n < 2 * kBusGroupsMax; ++n)
+    fleet.buses.push_back({.bus = BusId{n}, .units = 10, .answering = 9, .errors = n});
+  fleet.buses[3].link = LinkState::kOff;
+  fleet.buses[2].waiting = 7;
+  const std::string page = MetricsText(fleet, WorkCounters{}, ProcessFacts{}, 0);
+  EXPECT_THAT(page, HasSubstr("focalfleet_bus_units{bus=\"2-3\"} 20\n"));
+  EXPECT_THAT(page, HasSubstr("focalfleet_bus_units_answering{bus=\"2-3\"} 18\n"));
+  EXPECT_THAT(page, HasSubstr("focalfleet_bus_errors_total{bus=\"2-3\"} 5\n"));
+  EXPECT_THAT(page, HasSubstr("focalfleet_bus_queue_frames{bus=\"2-3\"} 7\n"));
+  EXPECT_THAT(page, HasSubstr("focalfleet_bus_state{bus=\"2-3\",state=\"off\"} 1\n"));
+  EXPECT_THAT(page, HasSubstr("focalfleet_bus_state{bus=\"2-3\",state=\"up\"} 0\n"));
+  EXPECT_THAT(page, HasSubstr("focalfleet_bus_units{bus=\"98-99\"} 20\n"));
+}
+
+TEST(MetricsText, EachOfFewBusesIsAGroup) {
+  const std::string page = PageOf({.units = 100, .buses = 50, .rails = 1});
+  EXPECT_THAT(page, HasSubstr("focalfleet_bus_units{bus=\"49\"} 2\n"));
 }
 
 TEST(MetricsText, HasAtMostAThousandSeriesForFiftyBuses) {
