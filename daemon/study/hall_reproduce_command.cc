@@ -17,7 +17,7 @@ struct HallReproduceCommandOptions {
   std::uint64_t seed = 1;
 };
 
-report::Axis AxisX(const std::string& figure) {
+report::Axis HallAxisX(const std::string& figure) {
   if (figure.starts_with("figure 6") || figure.find("along theta") != std::string::npos)
     return {.label = "theta", .unit = "deg"};
   if (figure.find("obliquely") != std::string::npos)
@@ -26,7 +26,7 @@ report::Axis AxisX(const std::string& figure) {
   return {.label = "actual", .unit = "deg"};
 }
 
-report::Axis AxisY(const std::string& figure) {
+report::Axis HallAxisY(const std::string& figure) {
   if (figure.starts_with("figure 6"))
     return {.label = "slope of the radial field", .unit = "mT/deg"};
   if (figure.find("obliquely") != std::string::npos)
@@ -51,7 +51,7 @@ std::string PageOf(const sim::Reproduction& reproduction) {
       figures.push_back(curve.figure);
   std::sort(figures.begin(), figures.end());
   for (const std::string& figure : figures) {
-    report::LinePlot plot{.title = figure, .x = AxisX(figure), .y = AxisY(figure)};
+    report::LinePlot plot{.title = figure, .x = HallAxisX(figure), .y = HallAxisY(figure)};
     for (const sim::ClaimCurve& curve : reproduction.curves)
       if (curve.figure == figure)
         plot.series.push_back({.name = curve.name, .x = curve.x, .y = curve.y});

@@ -17,6 +17,7 @@
 #include "sim/campaigns/diagnosis/find_model.h"
 #include "sim/campaigns/diagnosis/fine_structure.h"
 #include "sim/campaigns/diagnosis/gain.h"
+#include "sim/campaigns/diagnosis/geometry_check.h"
 #include "sim/campaigns/diagnosis/name_causes.h"
 #include "sim/campaigns/diagnosis/next_moves.h"
 #include "sim/campaigns/diagnosis/outliers.h"
