@@ -8,10 +8,10 @@
 #include <map>
 
 #include "daemon/campaign/sha256.h"
-#include "daemon/cli/hall_options.h"
 #include "daemon/cli/table.h"
 #include "daemon/cli/table_input.h"
 #include "daemon/files/text_file.h"
+#include "daemon/study/hall_options.h"
 
 namespace focalfleet::cli {
 namespace {

@@ -5,10 +5,10 @@
 
 #include <cmath>
 
-#include "daemon/cli/hall_options.h"
 #include "daemon/cli/table.h"
 #include "daemon/cli/table_input.h"
 #include "daemon/files/text_file.h"
+#include "daemon/study/hall_options.h"
 #include "sim/hall/diagnosis/calibration.h"
 
 namespace focalfleet::cli {
