@@ -219,13 +219,15 @@ class YannyParser {
     std::string element;
     bool inner = false;
     std::size_t count = 0;
-    while (elements.Next(&element, &inner) && count < field.elements) {
+    for (; elements.Next(&element, &inner); ++count) {
+      if (count == field.elements)
+        return FailAt(line, "field " + field.name + ": more than " +
+                                std::to_string(field.elements) + " elements");
       cells->push_back(element);
-      ++count;
     }
     if (count != field.elements)
-      return FailAt(line, "field " + field.name + ": " + std::to_string(count) + " elements are not " +
-                              std::to_string(field.elements));
+      return FailAt(line, "field " + field.name + ": " + std::to_string(count) +
+                              " elements are not " + std::to_string(field.elements));
     return {};
   }
 
