@@ -101,7 +101,8 @@ std::vector<bool> Newest(const CsvTable& table, const std::string& name) {
     const double time_s = SecondsOf(table.cell(row, *time_column));
     const auto [it, fresh] = best.try_emplace(table.cell(row, *name_column), row, time_s);
     if (fresh) continue;
-    const bool later = std::isnan(it->second.second) || time_s >= it->second.second;
+    if (!(time_s != it->second.second)) continue;  // of one time: AddUnit refuses the second
+    const bool later = std::isnan(it->second.second) || time_s > it->second.second;
     newest[later ? it->second.first : row] = false;
     if (later) it->second = {row, time_s};
   }
