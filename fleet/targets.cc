@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "fleet/files/bad_rows.h"
+#include "fleet/files/place.h"
 #include "fleet/geometry/clearance.h"
 #include "fleet/kinematics.h"
 #include "protocol/base/check.h"
@@ -21,7 +22,7 @@ std::string Number(double value) {
 }
 
 std::string At(const Targets& targets, const TargetRow& row) {
-  return targets.source + ":" + std::to_string(row.line) + ": unit " +
+  return PlaceIn(targets.source, row.line) + ": unit " +
          std::to_string(row.unit.value);
 }
 
@@ -204,8 +205,8 @@ void FindCollisions(const Targets& targets, std::span<const Resolved> rows, cons
       const ArmOf other{j, ArmAt(layout.unit(j), drives[j.value], *poses[j.value])};
       if (IsClear(layout, arm, other, -kToleranceMm)) continue;
       bad->Add(At(targets, *row) + ": its target collides with that of unit " +
-                   std::to_string(earlier->second->unit.value) + " in line " +
-                   std::to_string(earlier->second->line) + ": their arms would be " +
+                   std::to_string(earlier->second->unit.value) + " in " +
+                   LineOrRow(earlier->second->line) + ": their arms would be " +
                    Number(std::sqrt(SquaredDistance(arm.arm_fp, other.arm_fp))) + " mm apart, " +
                    Number(ClearDistanceMm(layout, i, j)) + " mm are needed",
                "collides with another target");
@@ -235,7 +236,7 @@ Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
       continue;
     }
     if (const auto [it, fresh] = line_of.emplace(row.unit, row.line); !fresh) {
-      bad.Add(at + "named twice, first in line " + std::to_string(it->second), "named twice");
+      bad.Add(at + "named twice, first in " + LineOrRow(it->second), "named twice");
       continue;
     }
     const std::uint32_t i = index->value;

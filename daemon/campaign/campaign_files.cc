@@ -14,6 +14,7 @@
 #include "fleet/files/cell.h"
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"
+#include "fleet/files/place.h"
 
 namespace focalfleet {
 namespace {
@@ -127,7 +128,7 @@ MoveRow ReadMove(CsvRow* row, const std::unordered_map<std::uint32_t, std::size_
 
 std::string TwiceText(std::uint32_t id, std::int64_t move, int line) {
   return "column move_id: unit " + std::to_string(id) + " has move " + std::to_string(move) +
-         " twice, first in line " + std::to_string(line);
+         " twice, first in " + LineOrRow(line);
 }
 
 /// The columns of moves.csv beyond the required ones. Values stand in the order of the file.
@@ -137,7 +138,7 @@ class MoreColumns {
   /// cells.
   explicit MoreColumns(const CsvTable& table) {
     for (std::size_t column = 0; column < table.columns().size(); ++column) {
-      const std::string& name = table.columns()[column];
+      const std::string& name = table.known_as(column);
       if (std::ranges::count(kFixedColumns, name) > 0) continue;
       if (name == kWordColumn) {
         modes_ = sim::WordColumn{name, {kModes.begin(), kModes.end()}, {}};
@@ -199,8 +200,8 @@ class MoreColumns {
     }
     if (!word) return {};
     if (!any_number) return name;
-    return name + " (not all numbers: " + Quoted(table.cell(*word, column)) + " in line " +
-           std::to_string(table.line(*word)) + ")";
+    return name + " (not all numbers: " + Quoted(table.cell(*word, column)) + " in " +
+           LineOrRow(table.line(*word)) + ")";
   }
 
   static std::optional<double> ValueOf(CsvRow* row, const std::string& name) {

@@ -12,7 +12,7 @@
 #include "daemon/cli/configuration_summary.h"
 #include "daemon/cli/operator_commands.h"
 #include "daemon/cli/progress_bar.h"
-#include "daemon/files/text_file.h"
+#include "daemon/cli/table_input.h"
 #include "fleet/files/targets_file.h"
 
 namespace focalfleet::cli {
@@ -92,7 +92,7 @@ ExitCode ReportDryRun(const Context& context, const tl::expected<Json, Failure>&
 }
 
 ExitCode RunApply(const Context& context, const ApplyOptions& options) {
-  auto text = ReadTextFile(options.file);
+  auto text = ReadTable(context, options.file, "unit_id");
   if (!text) return Report(context, text.error());
   // The rest of the line and the escapes of its text must fit, too.
   if (text->size() > kControlLineBytesMax / 2) {

@@ -17,6 +17,7 @@
 #include "daemon/cli/configuration_summary.h"
 #include "daemon/cli/offline_fleet.h"
 #include "daemon/cli/progress_bar.h"
+#include "daemon/cli/table_input.h"
 #include "daemon/files/text_file.h"
 #include "fleet/files/targets_file.h"
 
@@ -184,7 +185,7 @@ tl::expected<MadeMove, Failure> MakeMove(const Context& context, const ListedMov
 ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   const auto fleet = LoadFleet(context, options.files);
   if (!fleet) return Report(context, fleet.error());
-  const auto text = ReadTextFile(options.list);
+  const auto text = ReadTable(context, options.list, "unit_id");
   if (!text) return Report(context, text.error());
   const auto list = ReadMoveList(*text, options.list, fleet->layout);
   if (!list) return Report(context, list.error());

@@ -33,7 +33,7 @@ struct Group {
 /// The groups of the commands in help, in their order. A command of no group is under kTools.
 const std::vector<Group>& Groups() {
   static const std::vector<Group> groups = {
-      {"Prepare a configuration", {"layout", "targets", "plan", "estimate"}},
+      {"Prepare a configuration", {"import", "layout", "targets", "plan", "estimate", "export"}},
       {"Operate the fleet", {"apply", "wait", "retarget", "stop", "home", "measure"}},
       {"Watch the fleet",
        {"status", "doctor", "unit", "state", "alarms", "events", "history", "watch",
@@ -83,9 +83,9 @@ void AddGlobalOptions(CommandLine* line) {
 }
 
 // Commands that never ask a daemon. They end with kRefused where their answer cannot be written.
-constexpr std::array<std::string_view, 13> kOffline = {
-    "can",  "completion", "diagnose", "estimate", "hall",    "help", "layout",
-    "plan", "reproduce",  "simulate", "store",    "targets", "tune"};
+constexpr std::array<std::string_view, 15> kOffline = {
+    "can",    "completion", "diagnose",  "estimate", "export", "hall",    "help", "import",
+    "layout", "plan",       "reproduce", "simulate", "store",  "targets", "tune"};
 
 // Fills standard streams that the caller closed. Otherwise an opened file would get the number of a
 // closed stream, and messages would end in it. The file /dev/null, opened in the wrong direction,
@@ -188,6 +188,7 @@ std::unique_ptr<CommandLine> MakeCommandLine(AddStudy add_study) {
   app.fallthrough();  // a global option may stand after the command, too
   app.require_subcommand(1);
   AddGlobalOptions(line.get());
+  AddImportCommands(line.get());
   AddLayoutCommand(line.get());
   AddTargetsCommand(line.get());
   AddPlanCommand(line.get());

@@ -64,6 +64,7 @@ CLI::Option* OneOf(CLI::Option* option, const std::vector<std::string>& words);
 /// 309 digits.
 CLI::Validator NumberBetween(double low, double high);
 
+void AddImportCommands(CommandLine* line);  // import, export
 void AddLayoutCommand(CommandLine* line);
 void AddTargetsCommand(CommandLine* line);
 void AddPlanCommand(CommandLine* line);

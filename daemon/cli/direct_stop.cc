@@ -16,6 +16,7 @@
 #include "daemon/files/text_file.h"
 #include "daemon/ports/socketcan_port.h"
 #include "daemon/ports/unix_port.h"
+#include "daemon/tables/read_table.h"
 #include "fleet/files/layout_file.h"
 #include "protocol/wire/codec.h"
 
@@ -133,7 +134,7 @@ struct Aim {
 Result<Aim> AimAtUnit(const toml::table& table, UnitId id, const std::string& config, Aim all) {
   const std::string path =
       BesideConfig(config, table["fleet"]["units"].value_or(std::string("units.csv")));
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(path, "unit_id"));
   FOCALFLEET_TRY_ASSIGN(const Layout layout, ReadLayout(text, path, {}));
   const auto i = layout.Find(id);
   if (!i) return Fail(ErrorCode::kInvalid, fmt::format("{}: there is no unit {}", path, id.value));

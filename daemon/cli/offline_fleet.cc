@@ -5,7 +5,7 @@
 #include <map>
 
 #include "daemon/cli/command_line.h"
-#include "daemon/files/text_file.h"
+#include "daemon/cli/table_input.h"
 #include "daemon/store/store_reader.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"
@@ -75,10 +75,10 @@ Status TakeTuned(const std::string& store, OfflineFleet* fleet) {
 }
 
 Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(files.units));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTable(context, files.units, "unit_id"));
   Layout::Options options{.clearance_mm = files.clearance_mm};
   if (!files.obstacles.empty()) {
-    FOCALFLEET_TRY_ASSIGN(const std::string obstacles, ReadTextFile(files.obstacles));
+    FOCALFLEET_TRY_ASSIGN(const std::string obstacles, ReadTable(context, files.obstacles, "obstacle_id"));
     FOCALFLEET_TRY_ASSIGN(options.obstacles, ReadObstacles(obstacles, files.obstacles));
   }
   // Ignored columns are reported: a misspelt column would otherwise be ignored without a message.
@@ -91,7 +91,7 @@ Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) 
 
 Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet,
                              WhoseState required) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(path, "unit_id"));
   FOCALFLEET_TRY_ASSIGN(StatePoses poses, ReadState(text, path, fleet.layout, fleet.drives));
   FOCALFLEET_TRY(RequirePoses(path, fleet.layout, poses, required));
   return poses;
@@ -139,7 +139,7 @@ Reported ReportByModel(const Compensation& compensation, const OfflineFleet& fle
 
 Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& fleet,
                                 const StatePoses& state, const PlanFiles& files) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(files.targets));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTable(context, files.targets, "unit_id"));
   FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(text, files.targets));
   ReportPassedOver(context, files.targets, targets.ignored_columns);
   FOCALFLEET_TRY_ASSIGN(StatePoses poses,

@@ -14,6 +14,7 @@
 
 #include "daemon/dds/loopback_config.h"
 #include "daemon/files/text_file.h"
+#include "daemon/tables/read_table.h"
 #include "fleet/files/layout_file.h"
 
 namespace focalfleet::doctor {
@@ -39,7 +40,7 @@ DiskFacts LookAtDisk(const std::string& folder) {
 }
 
 Result<std::size_t> BusesOf(const DaemonConfig& config) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(config.fleet.units));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(config.fleet.units, "unit_id"));
   FOCALFLEET_TRY_ASSIGN(const Layout layout, ReadLayout(text, config.fleet.units, {}));
   return layout.buses().size();
 }

@@ -263,8 +263,9 @@ void AddKeys(fitsfile* file, FitsTable* table) {
 }
 
 std::string FormOf(const FitsColumn& column) {
-  if (std::holds_alternative<std::vector<double>>(column.values)) return "1D";
-  if (std::holds_alternative<std::vector<std::int64_t>>(column.values)) return "1K";
+  const std::string repeat = std::to_string(column.elements);
+  if (std::holds_alternative<std::vector<double>>(column.values)) return repeat + "D";
+  if (std::holds_alternative<std::vector<std::int64_t>>(column.values)) return repeat + "K";
   std::size_t width = 1;
   for (const std::string& text : std::get<std::vector<std::string>>(column.values))
     width = std::max(width, text.size());
@@ -305,7 +306,8 @@ void WriteKey(fitsfile* file, const FitsKey& key, int* status) {
 std::size_t FitsTable::rows() const {
   return columns.empty()
              ? 0
-             : std::visit([](const auto& values) { return values.size(); }, columns.front().values);
+             : std::visit([](const auto& values) { return values.size(); }, columns.front().values) /
+                   columns.front().elements;
 }
 
 const FitsColumn* FitsTable::Find(std::string_view column) const {

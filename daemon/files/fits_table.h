@@ -24,6 +24,7 @@ struct FitsColumn {
   std::string name;
   std::string unit;  // of the FITS standard: mm, um, deg, s; empty: none
   FitsValues values;
+  std::size_t elements = 1;  // numbers a row; their vectors follow each other in `values`
 };
 
 struct FitsKey {

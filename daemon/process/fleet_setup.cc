@@ -9,6 +9,7 @@
 #include "daemon/files/text_file.h"
 #include "daemon/ports/simulated_port.h"
 #include "daemon/ports/unix_port.h"
+#include "daemon/tables/read_table.h"
 #include "fleet/files/fiducials_file.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"
@@ -93,17 +94,17 @@ Result<Ports> OpenSimulated(const DaemonConfig& config, const Layout& layout,
 Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet) {
   Layout::Options options{.clearance_mm = fleet.clearance_mm, .obstacles = {}};
   if (!fleet.obstacles.empty()) {
-    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(fleet.obstacles));
+    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(fleet.obstacles, "obstacle_id"));
     FOCALFLEET_TRY_ASSIGN(options.obstacles, ReadObstacles(text, fleet.obstacles));
   }
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(fleet.units));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(fleet.units, "unit_id"));
   return ReadLayout(text, fleet.units, std::move(options));
 }
 
 Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera) {
   CameraSite site{.model = camera.model, .sensor = camera.sensor, .fiducials = {}, .options = {}};
   site.options.centroid_sigma_mm = 1e-3 * camera.centroid_sigma_um;
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(camera.fiducials));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(camera.fiducials, "fiducial_id"));
   FOCALFLEET_TRY_ASSIGN(site.fiducials, ReadFiducials(text, camera.fiducials));
   double radius_mm = 0;
   for (const Fiducial& fiducial : site.fiducials)

@@ -6,6 +6,7 @@
 
 #include "daemon/clock/wall_time.h"
 #include "daemon/files/text_file.h"
+#include "daemon/tables/read_table.h"
 #include "fleet/camera/spots.h"
 #include "fleet/files/fiducials_file.h"
 #include "fleet/files/spots_file.h"
@@ -32,7 +33,7 @@ std::optional<std::uint64_t> Asked(const std::string& path) {
 
 Result<CameraDoor> CameraDoor::Open(const Options& options) {
   CameraDoor door(options);
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.fiducials_path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(options.fiducials_path, "fiducial_id"));
   FOCALFLEET_TRY_ASSIGN(const auto fiducials, ReadFiducials(text, options.fiducials_path));
   for (const Fiducial& fiducial : fiducials)
     door.fiducials_.push_back({.kind = sim::LightKind::kFiducial,

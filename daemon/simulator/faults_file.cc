@@ -151,7 +151,7 @@ Result<std::vector<PlannedFault>> ReadFaults(std::string_view text, std::string 
       "fault"sv, "bus_id"sv, "unit_id"sv, "from_s"sv, "to_s"sv, "chance"sv, "value"sv};
   FOCALFLEET_TRY(table.Require(kKnown));
   for (std::size_t column = 0; column < table.columns().size(); ++column)
-    if (table.HasName(column) && !std::ranges::count(kKnown, table.columns()[column]))
+    if (table.HasName(column) && !std::ranges::count(kKnown, table.known_as(column)))
       return Fail(ErrorCode::kInvalid,
                   table.file() + ": no column is called '" + table.columns()[column] + "'");
   return Reader(table, fleet).Read();

@@ -28,6 +28,7 @@
 #include "daemon/simulator/memory_file.h"
 #include "daemon/simulator/unix_doors.h"
 #include "daemon/simulator/verbs.h"
+#include "daemon/tables/read_table.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/state_file.h"
 
@@ -40,7 +41,7 @@ constexpr std::int64_t kGrainNs = 100'000;
 
 Status PlaceUnits(const std::string& path, const Layout& layout, sim::WorldConfig* config) {
   if (path.empty()) return {};
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(path, "unit_id"));
   const std::vector<UnitDrive> drives(layout.size());
   FOCALFLEET_TRY_ASSIGN(const auto poses, ReadState(text, path, layout, drives));
   FOCALFLEET_TRY(RequirePoses(path, layout, poses, WhoseState::kAll));
@@ -67,7 +68,7 @@ Status Remember(const SimulatorOptions& options, sim::WorldConfig* config) {
 
 Status PlanFaults(const SimulatorOptions& options, sim::WorldConfig* config) {
   if (options.faults_path.empty()) return {};
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.faults_path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(options.faults_path, "fault"));
   FOCALFLEET_TRY_ASSIGN(config->faults,
                         ReadFaults(text, options.faults_path, {config->units, config->bit_clock}));
   return {};
@@ -86,7 +87,7 @@ Status SetClocks(const SimulatorOptions& options, sim::WorldConfig* config) {
 }
 
 Result<sim::WorldConfig> Configure(const SimulatorOptions& options, const HostClock& clock) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.units_path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(options.units_path, "unit_id"));
   FOCALFLEET_TRY_ASSIGN(const Layout layout, ReadLayout(text, options.units_path, {}));
   sim::WorldConfig config;
   config.units = DescribeUnits(layout);

@@ -10,6 +10,7 @@
 #include "daemon/control/line_client.h"
 #include "daemon/control/printable.h"
 #include "daemon/files/text_file.h"
+#include "daemon/tables/read_table.h"
 #include "sim/hall/fibre_carrier.h"
 
 namespace focalfleet::simulator {
@@ -79,7 +80,7 @@ int WriteField(const Given& given) {
 int ReportTruth(const Given& given) {
   Json args = Json::object();
   if (!given.targets.empty()) {
-    const auto text = ReadTextFile(given.targets);
+    const auto text = ReadTableAsText(given.targets, "unit_id");
     if (!text) return Complain(text.error(), ExitCode::kRefused);
     args = {{"targets_csv", *text}, {"targets_name", given.targets}};
   }

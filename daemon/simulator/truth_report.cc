@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "fleet/files/csv.h"
+#include "fleet/files/place.h"
 #include "sim/world/mechanism.h"
 
 namespace focalfleet::simulator {
@@ -54,7 +55,7 @@ Result<TrueErrors> CompareWithTargets(const sim::World& world, const Targets& ta
   for (const TargetRow& target : targets.rows) {
     const auto row = world.Find(target.unit);
     if (!row)
-      return Fail(ErrorCode::kInvalid, targets.source + ":" + std::to_string(target.line) +
+      return Fail(ErrorCode::kInvalid, PlaceIn(targets.source, target.line) +
                                            ": no unit " + std::to_string(target.unit.value) +
                                            " in this fleet");
     const sim::UnitDescription& unit = world.units()[*row];

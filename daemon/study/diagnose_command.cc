@@ -20,6 +20,7 @@
 #include "daemon/study/compare_models_command.h"
 #include "daemon/study/measured_campaign.h"
 #include "daemon/study/study.h"
+#include "daemon/tables/read_table.h"
 #include "protocol/base/rng.h"
 #include "sim/campaigns/diagnosis/plain_geometry.h"
 #include "sim/campaigns/diagnosis/planted.h"
@@ -199,7 +200,7 @@ Result<sim::Campaign> Predicted(const Context& context, const SimulateCampaignOp
 Result<sim::Campaign> Simulate(sim::PlantedOptions planted, const std::string& next) {
   FOCALFLEET_TRY_ASSIGN(sim::Campaign campaign, sim::PlantCampaign(planted));
   if (next.empty()) return campaign;
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(next));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(next, "unit_id"));
   FOCALFLEET_TRY_ASSIGN(planted.next, ReadNextMoves(text, next, campaign.units));
   return sim::PlantCampaign(planted);
 }

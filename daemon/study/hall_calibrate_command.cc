@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "daemon/cli/table.h"
+#include "daemon/cli/table_input.h"
 #include "daemon/files/text_file.h"
 #include "daemon/study/hall_options.h"
 #include "sim/hall/diagnosis/calibration.h"
@@ -128,7 +129,7 @@ ExitCode RunHallCalibrate(const Context& context, const HallCalibrateOptions& op
   if (!sensors) return Report(context, sensors.error());
   const auto rig = RigOf(*model, std::move(*sensors));
   if (!rig) return Report(context, {rig.error().code, options.model + ": " + rig.error().text});
-  const auto text = ReadTextFile(options.data);
+  const auto text = ReadTable(context, options.data, "alpha_deg");
   if (!text) return Report(context, text.error());
   auto table = ReadPoses(*text, options.data, rig->sensors.size());
   if (!table) return Report(context, table.error());

@@ -9,6 +9,7 @@
 
 #include "daemon/campaign/sha256.h"
 #include "daemon/cli/table.h"
+#include "daemon/cli/table_input.h"
 #include "daemon/files/text_file.h"
 #include "daemon/study/hall_options.h"
 
@@ -58,7 +59,7 @@ std::size_t Saturated(const sim::FieldMap& map) {
 }
 
 ExitCode RunHallFit(const Context& context, const HallFitOptions& options) {
-  const auto text = ReadTextFile(options.data);
+  const auto text = ReadTable(context, options.data, "b_T");
   if (!text) return Report(context, text.error());
   const auto map = ReadFieldMap(*text, options.data);
   if (!map) return Report(context, map.error());
@@ -214,7 +215,7 @@ ExitCode RunHallOrient(const Context& context, const HallOrientOptions& options)
   if (!model) return Report(context, model.error());
   auto sensors = SensorsOf(options.sensors);
   if (!sensors) return Report(context, sensors.error());
-  const auto text = ReadTextFile(options.data);
+  const auto text = ReadTable(context, options.data, "v1_V");
   if (!text) return Report(context, text.error());
   auto rig = RigOf(*model, std::move(*sensors));
   if (!rig) return Report(context, {rig.error().code, options.model + ": " + rig.error().text});
@@ -251,7 +252,7 @@ Result<std::vector<sim::HallSensor>> SensorsOf(const HallSensorOptions& options)
   if (!options.sensors.empty()) {
     if (!options.angles_deg.empty())
       return Fail(ErrorCode::kInvalid, "--sensors and --sensor-angles-deg say different things");
-    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.sensors));
+    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(options.sensors, "sensor"));
     return ReadSensors(text, options.sensors);
   }
   sim::SensorAngles angles;

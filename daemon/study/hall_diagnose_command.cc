@@ -7,6 +7,7 @@
 
 #include "daemon/campaign/sha256.h"
 #include "daemon/cli/table.h"
+#include "daemon/cli/table_input.h"
 #include "daemon/files/text_file.h"
 #include "daemon/hall/hall_report.h"
 #include "daemon/study/hall_options.h"
@@ -74,7 +75,7 @@ ExitCode RunHallDiagnose(const Context& context, const HallDiagnoseOptions& opti
   if (!sensors) return Report(context, sensors.error());
   const auto rig = RigOf(model, std::move(*sensors));
   if (!rig) return Report(context, {rig.error().code, options.model + ": " + rig.error().text});
-  const auto text = ReadTextFile(options.data);
+  const auto text = ReadTable(context, options.data, "alpha_deg");
   if (!text) return Report(context, text.error());
   auto table = ReadPoses(*text, options.data, rig->sensors.size());
   if (!table) return Report(context, table.error());

@@ -10,15 +10,17 @@
 
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/campaign/sha256.h"
+#include "daemon/cli/table_input.h"
 #include "daemon/files/text_file.h"
 
 namespace focalfleet::cli {
 
 Result<MeasuredCampaign> ReadMeasuredCampaign(const Context& context, const std::string& folder) {
   const std::filesystem::path path(folder);
-  const std::string moves_file = path / "moves.csv", units_file = path / "units.csv";
-  FOCALFLEET_TRY_ASSIGN(const std::string moves, ReadTextFile(moves_file));
-  FOCALFLEET_TRY_ASSIGN(const std::string units, ReadTextFile(units_file));
+  const std::string moves_file = FindTable(folder, "moves");
+  const std::string units_file = FindTable(folder, "units");
+  FOCALFLEET_TRY_ASSIGN(const std::string moves, ReadTable(context, moves_file, "move_id"));
+  FOCALFLEET_TRY_ASSIGN(const std::string units, ReadTable(context, units_file, "unit_id"));
   MeasuredCampaign in;
   in.names.campaign = path.filename().empty() ? path.parent_path().filename() : path.filename();
   TableNotes notes;

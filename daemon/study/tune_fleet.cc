@@ -11,6 +11,7 @@
 #include "daemon/files/text_file.h"
 #include "daemon/store/store.h"
 #include "daemon/study/tune.h"
+#include "daemon/tables/read_table.h"
 #include "fleet/drive_choice.h"
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"
@@ -31,7 +32,7 @@ struct AxisLoad {
 };
 
 Result<std::vector<AxisLoad>> LoadsOf(const TuneOptions& options, const DriveChoice& choice) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.units));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(options.units, "unit_id"));
   FOCALFLEET_TRY_ASSIGN(const UnitsFile file, ReadUnits(text, options.units));
   std::vector<AxisLoad> loads;
   for (const Unit& unit : file.units)
@@ -43,7 +44,7 @@ Result<std::vector<AxisLoad>> LoadsOf(const TuneOptions& options, const DriveCho
                        choice.setting.motor.load_Nm * std::max(kLoadShareMin, 1 + off)});
     }
   if (options.loads.empty()) return loads;
-  FOCALFLEET_TRY_ASSIGN(const std::string loads_text, ReadTextFile(options.loads));
+  FOCALFLEET_TRY_ASSIGN(const std::string loads_text, ReadTableAsText(options.loads, "unit_id"));
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(loads_text, options.loads));
   FOCALFLEET_TRY(table.Require({"unit_id", "axis", "load_uNm"}));
   std::vector<bool> given(loads.size(), false);

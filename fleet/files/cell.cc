@@ -1,7 +1,9 @@
 #include "fleet/files/cell.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <system_error>
 
 namespace focalfleet {
@@ -32,14 +34,28 @@ std::string Quoted(std::string_view cell) {
 }
 
 bool IsMissing(std::string_view cell) {
-  return cell.empty() || (cell.size() == 3 && Lower(cell) == "nan");
+  constexpr std::size_t kLongest = 4;
+  if (cell.empty() || cell == "--" || cell == "\\N") return true;
+  if (cell.size() > kLongest) return false;
+  const std::string word = Lower(cell);
+  constexpr std::string_view kWords[] = {"nan", "null", "none", "n/a", "na", "<na>"};
+  return std::ranges::find(kWords, word) != std::end(kWords);
 }
 
 std::optional<double> ParseNumber(std::string_view cell) {
   if (cell.starts_with('+') && !cell.starts_with("+-")) cell.remove_prefix(1);
   double value = 0;
-  const auto [end, problem] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (problem != std::errc() || end != cell.data() + cell.size()) return std::nullopt;
+  const char* const end_of_cell = cell.data() + cell.size();
+  const auto [end, problem] = std::from_chars(cell.data(), end_of_cell, value);
+  if (problem == std::errc() && end == end_of_cell) return value;
+  // Fortran writes the exponent of a double behind a D.
+  if (problem != std::errc() || (*end != 'D' && *end != 'd')) return std::nullopt;
+  constexpr std::size_t kLongest = 64;
+  if (cell.size() > kLongest) return std::nullopt;
+  std::string with_e(cell);
+  with_e[static_cast<std::size_t>(end - cell.data())] = 'e';
+  const auto again = std::from_chars(with_e.data(), with_e.data() + with_e.size(), value);
+  if (again.ec != std::errc() || again.ptr != with_e.data() + with_e.size()) return std::nullopt;
   return value;
 }
 

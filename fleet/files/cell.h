@@ -15,8 +15,8 @@ std::string_view Trimmed(std::string_view text);
 std::string Quoted(std::string_view cell);
 
 // Pre: the cell is Trimmed.
-bool IsMissing(std::string_view cell);                     // empty or nan
-std::optional<double> ParseNumber(std::string_view cell);  // may be infinite
+bool IsMissing(std::string_view cell);  // empty, nan, null, none, n/a, na, <na>, --, \N
+std::optional<double> ParseNumber(std::string_view cell);  // may be infinite; Fortran's 1.5D3, too
 std::optional<bool> ParseFlagWord(std::string_view cell);  // true, false, T, F; any capitals
 
 enum class CellKind : std::uint8_t { kMissing, kNumber, kFlag, kWord };

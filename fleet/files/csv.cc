@@ -1,10 +1,12 @@
 #include "fleet/files/csv.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "fleet/files/cell.h"
 #include "fleet/files/foreign_format.h"
+#include "fleet/files/place.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {
@@ -22,6 +24,20 @@ bool IsUnnamed(std::string_view name) {
   return name.empty() ||
          (name.starts_with(kPandas) &&
           name.substr(kPandas.size()).find_first_not_of("0123456789.") == std::string_view::npos);
+}
+
+/// A name in capitals alone as this project would write it; other names as they stand.
+std::string InSmallLetters(const std::string& name) {
+  const auto is_small = [](char c) { return c >= 'a' && c <= 'z'; };
+  const auto is_capital = [](char c) { return c >= 'A' && c <= 'Z'; };
+  if (name.size() < 2 || std::ranges::any_of(name, is_small)) return name;
+  std::string small = name;
+  for (char& c : small)
+    if (is_capital(c)) c = static_cast<char>(c - 'A' + 'a');
+  constexpr std::string_view kCapitalUnits[] = {"_v", "_a", "_w", "_j", "_c"};
+  for (const std::string_view unit : kCapitalUnits)
+    if (small.ends_with(unit)) small.back() = name.back();
+  return small;
 }
 
 }  // namespace
@@ -44,13 +60,18 @@ class CsvParser {
 
  private:
   [[nodiscard]] tl::unexpected<Error> FailAt(int line, const std::string& reason) const {
-    return Fail(ErrorCode::kInvalid, table_.file_ + ":" + std::to_string(line) + ": " + reason);
+    return Fail(ErrorCode::kInvalid, PlaceIn(table_.file_, line) + ": " + reason);
   }
 
   Status CheckIsText() {
     if (const auto format = ForeignFormat(text_))
       return Fail(ErrorCode::kInvalid, table_.file_ + ": this is " + *format);
     if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
+    if (text_.find('\n') == std::string_view::npos && text_.find('\r') != std::string_view::npos) {
+      with_line_ends_ = text_;  // lines of an old Macintosh
+      std::ranges::replace(with_line_ends_, '\r', '\n');
+      text_ = with_line_ends_;
+    }
     int line = 1;
     for (const char c : text_) {
       const auto byte = static_cast<unsigned char>(c);
@@ -68,15 +89,15 @@ class CsvParser {
 
   // Parses up to and including one newline outside quotes. The text is known to end in one.
   Status ParseLine() {
-    const int line = line_;
+    const int line = place_ != 0 ? place_ : line_;
     const std::string_view rest = RestOfLine();
-    const bool holds_nothing = rest.find_first_not_of(" \t,") == std::string_view::npos;
-    if (holds_nothing || rest.starts_with('#')) {
-      if (rest.starts_with("# %ECSV")) is_ecsv_ = true;
+    const char* nothing = table_.decimal_comma_ ? " \t,;" : " \t,";
+    if (rest.starts_with('#')) TakeComment(rest.substr(1));
+    if (rest.find_first_not_of(nothing) == std::string_view::npos || rest.starts_with('#')) {
       SkipLine();
       return {};
     }
-    if (table_.header_line_ == 0) by_blanks_ = is_ecsv_ && rest.find(',') == std::string_view::npos;
+    if (table_.header_line_ == 0) ChooseSeparator(rest);
     row_begin_ = at_;
     std::vector<std::string> cells;
     do {
@@ -89,6 +110,31 @@ class CsvParser {
     if (table_.header_line_ == 0) return TakeHeader(line, std::move(cells));
     TakeRow(line, std::move(cells));
     return {};
+  }
+
+  void TakeComment(std::string_view comment) {
+    constexpr std::string_view kPlace = "@ ";
+    if (comment.starts_with(" %ECSV")) is_ecsv_ = true;
+    if (comment.starts_with(kPlace)) {
+      const auto number = ParseNumber(comment.substr(kPlace.size()));
+      if (number && std::abs(*number) < 1e9) place_ = static_cast<int>(*number);
+    } else if (is_ecsv_ && table_.header_line_ == 0) {
+      units_.Take(comment);
+    }
+  }
+
+  /// Chooses what separates cells, by the header. Commas come first: a semicolon beside them is
+  /// part of a name.
+  void ChooseSeparator(std::string_view header) {
+    bool in_quotes = false;
+    bool any[256] = {};
+    for (const char c : header) {
+      if (c == '"') in_quotes = !in_quotes;
+      if (!in_quotes) any[static_cast<unsigned char>(c)] = true;
+    }
+    separator_ = any[','] ? ',' : any[';'] ? ';' : any['\t'] ? '\t' : ',';
+    by_blanks_ = !any[','] && !any[';'] && (is_ecsv_ || (!any['\t'] && any[' ']));
+    table_.decimal_comma_ = separator_ == ';';
   }
 
   [[nodiscard]] bool RowIsTooLong() const { return at_ - row_begin_ > limits::kCsvRowBytes; }
@@ -107,14 +153,14 @@ class CsvParser {
     ++line_;
   }
   void SkipBlanks() {
-    while (text_[at_] == ' ' || text_[at_] == '\t') ++at_;
+    while (text_[at_] == ' ' || (text_[at_] == '\t' && (by_blanks_ || separator_ != '\t'))) ++at_;
   }
   [[nodiscard]] bool AtLineEnd() const {
     return text_[at_] == '\n' || text_.substr(at_, 2) == "\r\n";
   }
   [[nodiscard]] bool AtCellEnd() const {
     if (AtLineEnd()) return true;
-    return by_blanks_ ? text_[at_] == ' ' || text_[at_] == '\t' : text_[at_] == ',';
+    return by_blanks_ ? text_[at_] == ' ' || text_[at_] == '\t' : text_[at_] == separator_;
   }
 
   // Steps over what separates cells. False: the end of the line, which it steps over too.
@@ -162,14 +208,23 @@ class CsvParser {
 
   Status TakeHeader(int line, std::vector<std::string> cells) {
     table_.header_line_ = line;
-    if (cells.size() == 1 && cells[0].find_first_of(";\t") != std::string::npos)
-      return FailAt(line, "the header " + Quoted(cells[0]) + " is one column: cells are to be " +
-                              "separated by commas");
     for (std::size_t column = 0; column < cells.size(); ++column) {
       if (IsUnnamed(cells[column])) continue;
       if (!table_.index_.emplace(cells[column], column).second)
         return FailAt(line, "column " + Quoted(cells[column]) + " is there twice");
     }
+    for (std::size_t column = 0; column < cells.size(); ++column) {
+      const std::string small = InSmallLetters(cells[column]);
+      const bool is_known = small != cells[column] && table_.index_.emplace(small, column).second;
+      table_.known_as_.push_back(is_known ? small : cells[column]);
+    }
+    table_.units_.resize(cells.size());
+    table_.conversions_.resize(cells.size());
+    for (const auto& [name, unit] : units_.Units())
+      if (const auto column = table_.Find(name)) {
+        table_.units_[*column] = unit;
+        table_.conversions_[*column] = ConversionOf(table_.known_as_[*column], unit);
+      }
     table_.columns_ = std::move(cells);
     return {};
   }
@@ -191,12 +246,16 @@ class CsvParser {
     std::move(cells.begin(), cells.end(), std::back_inserter(table_.cells_));
   }
 
+  std::string with_line_ends_;
   std::string_view text_;
   std::size_t at_ = 0;
   std::size_t row_begin_ = 0;
   int line_ = 1;
+  int place_ = 0;  // of the next row in the file that the text was made from; 0: not made from one
   bool is_ecsv_ = false;
   bool by_blanks_ = false;  // ECSV's usual separator
+  char separator_ = ',';
+  EcsvUnits units_;
   CsvTable table_;
   BadRows of_another_width_;
 };
@@ -228,21 +287,22 @@ Status CsvTable::Require(std::initializer_list<std::string_view> columns) const 
   std::string found = JoinedNames(all);
   constexpr std::size_t kShown = 300;
   if (found.size() > kShown) found = found.substr(0, kShown) + "...";
-  return Fail(ErrorCode::kInvalid, file_ + ":" + std::to_string(header_line_) + ": column " +
-                                       JoinedNames(missing) + " is missing; there are: " + found);
+  return Fail(ErrorCode::kInvalid, (header_line_ > 0 ? PlaceIn(file_, header_line_) : file_) +
+                                       ": column " + JoinedNames(missing) +
+                                       " is missing; there are: " + found);
 }
 
 std::vector<std::string> CsvTable::Others(std::initializer_list<std::string_view> known) const {
   std::vector<std::string> others;
   for (std::size_t column = 0; column < columns_.size(); ++column)
-    if (std::find(known.begin(), known.end(), columns_[column]) == known.end())
+    if (std::find(known.begin(), known.end(), known_as_[column]) == known.end())
       others.push_back(Shown(column));
   return others;
 }
 
 Error CsvTable::ErrorAt(std::size_t row, std::string_view reason) const {
   return {ErrorCode::kInvalid,
-          file_ + ":" + std::to_string(line(row)) + ": " + std::string(reason)};
+          PlaceIn(file_, line(row)) + ": " + std::string(reason)};
 }
 
 }  // namespace focalfleet

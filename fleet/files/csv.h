@@ -1,7 +1,14 @@
 // A CSV table as the project's files use it: one header line, then one row a line. Lines that start
 // with `#` are comments. Lines of nothing but commas and blanks are skipped. A cell may be quoted
-// ("" is a quote within); lines may end in CRLF; an empty cell or `nan` is a missing value. ECSV of
-// astropy reads too, also with its usual blanks instead of commas.
+// ("" is a quote within); lines may end in CRLF; an empty cell or `nan` is a missing value, and so
+// are the words by which databases say so (cell.h). ECSV of astropy reads too, also with its usual
+// blanks instead of commas, and its units are converted (column_units.h).
+//
+// Without a comma in the header cells are separated by semicolons (numbers then may have a decimal
+// comma), else by tabs, else by blanks.
+//
+// Tables of other formats come as ECSV with a comment `#@ N` before each row: N is the row's line in
+// the file that the text was made from, or the negative number of the row (place.h).
 //
 // Columns without a name (the index of pandas, the last commas of spreadsheets) are skipped, as are
 // columns that a reader does not know.
@@ -27,6 +34,7 @@
 #include <vector>
 
 #include "fleet/files/bad_rows.h"
+#include "fleet/files/column_units.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet {
@@ -40,13 +48,16 @@ class CsvTable {
   [[nodiscard]] const std::string& file() const { return file_; }
   /// The names as they stand in the header.
   [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
+  /// The name by which Find knows a column: a name in capitals alone, as FITS has them, is known in
+  /// small letters (`unit_id` for UNIT_ID, `v_bus_V` for V_BUS_V) unless another column is called so.
+  [[nodiscard]] const std::string& known_as(std::size_t column) const { return known_as_[column]; }
   /// A column as messages call it; "column 1 (no name)" where it has none.
   [[nodiscard]] std::string Shown(std::size_t column) const;
   /// False where it has no name, or the one that pandas gives to a column without (`Unnamed: 0`).
   [[nodiscard]] bool HasName(std::size_t column) const;
   [[nodiscard]] std::optional<std::size_t> Find(std::string_view column) const;
   [[nodiscard]] std::size_t size() const { return lines_.size(); }  // rows
-  /// Line of the file in which the row begins, from 1.
+  /// Line of the file in which the row begins, from 1; negative: the number of the row (place.h).
   [[nodiscard]] int line(std::size_t row) const { return lines_[row]; }
   [[nodiscard]] const std::string& cell(std::size_t row, std::size_t column) const {
     return cells_[row * columns_.size() + column];
@@ -59,6 +70,16 @@ class CsvTable {
   [[nodiscard]] std::vector<std::string> Others(
       std::initializer_list<std::string_view> known) const;
   [[nodiscard]] Error ErrorAt(std::size_t row, std::string_view reason) const;
+  /// What makes numbers of the column's declared unit numbers of the unit in its name.
+  [[nodiscard]] const UnitConversion& conversion(std::size_t column) const {
+    return conversions_[column];
+  }
+  /// The unit that the table declares for a column; empty: none.
+  [[nodiscard]] const std::string& declared_unit(std::size_t column) const {
+    return units_[column];
+  }
+  /// True if `2,5` is a number.
+  [[nodiscard]] bool decimal_comma() const { return decimal_comma_; }
 
   /// Calls `read(CsvRow&)` for every row, in their order; a reader rejects what it does not take
   /// and keeps nothing of it. Errors: kInvalid, lists all rows that were rejected.
@@ -75,7 +96,11 @@ class CsvTable {
   };
   std::string file_;
   int header_line_ = 0;
+  bool decimal_comma_ = false;
   std::vector<std::string> columns_;
+  std::vector<std::string> known_as_;        // Shape: (columns)
+  std::vector<std::string> units_;           // as declared; Shape: (columns)
+  std::vector<UnitConversion> conversions_;  // Shape: (columns)
   std::unordered_map<std::string, std::size_t, TextHash, std::equal_to<>>
       index_;  // those with name
   std::vector<int> lines_;
@@ -95,7 +120,11 @@ class CsvRow {
 
   [[nodiscard]] bool Has(std::string_view column) const;  // the column is there and not missing
   double Number(std::string_view column);                 // finite, must be there
-  std::optional<double> NumberIfAny(std::string_view column);
+  std::optional<double> NumberIfAny(std::string_view column);  // in the unit of the name
+  /// A number of a column whose name has no unit, in the one that is wanted: converted where the
+  /// table declares another.
+  std::optional<double> NumberInIfAny(std::string_view column, std::string_view unit);
+  double NumberIn(std::string_view column, std::string_view unit);  // must be there
   std::int64_t Integer(std::string_view column, IntegerBounds bounds);
   std::optional<std::int64_t> IntegerIfAny(std::string_view column, IntegerBounds bounds);
   /// A cell of a 0/1 column: 1 and 0, or as other writers have them: true and false, T and F, in
@@ -117,6 +146,9 @@ class CsvRow {
  private:
   // The cell without the blanks around it; empty where the column is not there.
   [[nodiscard]] std::string_view Cell(std::string_view column) const;
+  // The number as it stands.
+  std::optional<double> PlainNumberIfAny(std::string_view column);
+  std::optional<double> Converted(std::string_view column, const UnitConversion& conversion);
 
   const CsvTable& table_;
   std::size_t row_;
@@ -148,6 +180,7 @@ class CsvWriter {
   CsvWriter& Text(std::string_view value);
   CsvWriter& Missing();
   void EndRow();
+  void Comment(std::string_view text);  // between two rows; the line is `#` and the text
   [[nodiscard]] std::string Take() { return std::move(text_); }
 
  private:

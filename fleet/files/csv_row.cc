@@ -18,6 +18,14 @@ std::string_view WithoutCell(std::string_view reason, std::string_view cell) {
   return reason;
 }
 
+/// `2,5` as `2.5`.
+std::string WithDecimalPoint(std::string_view cell) {
+  std::string text(cell);
+  if (std::ranges::count(text, ',') == 1 && text.find('.') == std::string::npos)
+    std::ranges::replace(text, ',', '.');
+  return text;
+}
+
 }  // namespace
 
 void CsvRow::Reject(std::string_view column, const std::string& reason) {
@@ -41,10 +49,11 @@ bool CsvRow::Has(std::string_view column) const { return !IsMissing(Cell(column)
 
 std::string CsvRow::Text(std::string_view column) const { return std::string(Cell(column)); }
 
-std::optional<double> CsvRow::NumberIfAny(std::string_view column) {
+std::optional<double> CsvRow::PlainNumberIfAny(std::string_view column) {
   const std::string_view cell = Cell(column);
   if (IsMissing(cell)) return std::nullopt;
-  const std::optional<double> value = ParseNumber(cell);
+  std::optional<double> value = ParseNumber(cell);
+  if (!value && table_.decimal_comma()) value = ParseNumber(WithDecimalPoint(cell));
   if (!value) {
     Reject(column, Quoted(cell) + " is not a number");
   } else if (!std::isfinite(*value)) {
@@ -53,6 +62,33 @@ std::optional<double> CsvRow::NumberIfAny(std::string_view column) {
     return value;
   }
   return std::nullopt;
+}
+
+std::optional<double> CsvRow::Converted(std::string_view column, const UnitConversion& conversion) {
+  const std::optional<double> value = PlainNumberIfAny(column);
+  if (!value || !conversion.IsNeeded()) return value;
+  if (!conversion.problem.empty()) {
+    Reject(column, conversion.problem);
+    return std::nullopt;
+  }
+  return *value * conversion.factor + conversion.offset;
+}
+
+std::optional<double> CsvRow::NumberIfAny(std::string_view column) {
+  const auto index = table_.Find(column);
+  return index ? Converted(column, table_.conversion(*index)) : std::nullopt;
+}
+
+std::optional<double> CsvRow::NumberInIfAny(std::string_view column, std::string_view unit) {
+  const auto index = table_.Find(column);
+  if (!index) return std::nullopt;
+  return Converted(column, ConversionOf("a_" + std::string(unit), table_.declared_unit(*index)));
+}
+
+double CsvRow::NumberIn(std::string_view column, std::string_view unit) {
+  const std::optional<double> value = NumberInIfAny(column, unit);
+  if (!value) Reject(column, kMissing);
+  return value.value_or(0);
 }
 
 double CsvRow::Number(std::string_view column) {
@@ -96,7 +132,9 @@ std::optional<bool> CsvRow::FlagIfAny(std::string_view column) {
 
 std::optional<double> CsvRow::NumberOrFlagIfAny(std::string_view column) {
   if (const auto word = ParseFlagWord(Cell(column))) return *word ? 1 : 0;
-  return NumberIfAny(column);
+  const auto index = table_.Find(column);
+  const bool other_unit = index && !table_.conversion(*index).problem.empty();
+  return other_unit ? PlainNumberIfAny(column) : NumberIfAny(column);
 }
 
 std::string NumberText(double value) {
@@ -148,6 +186,8 @@ CsvWriter& CsvWriter::Missing() {
   Separate();
   return *this;
 }
+
+void CsvWriter::Comment(std::string_view text) { text_.append("#").append(text).append("\n"); }
 
 void CsvWriter::EndRow() {
   text_ += '\n';

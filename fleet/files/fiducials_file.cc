@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "fleet/files/csv.h"
+#include "fleet/files/place.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {
@@ -31,7 +32,7 @@ Result<std::vector<Fiducial>> ReadFiducials(std::string_view text, std::string f
     if (row.error()) return;
     const std::string named = "fiducial " + std::to_string(fiducial.id);
     const auto twice = [&](const std::string& what, int line) {
-      row.RejectRow(named + ": " + what + ", first in line " + std::to_string(line), what);
+      row.RejectRow(named + ": " + what + ", first in " + LineOrRow(line), what);
     };
     if (const auto [it, fresh] = line_of.emplace(fiducial.id, row.line()); !fresh)
       return twice("is there twice", it->second);

@@ -5,6 +5,7 @@
 #include <unordered_map>
 
 #include "fleet/files/csv.h"
+#include "fleet/files/place.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {
@@ -66,7 +67,7 @@ std::string LinePrefix(const UnitsFile& file, std::string_view text) {
     return file.source + ": ";
   for (std::size_t i = 0; i < file.units.size(); ++i)
     if (file.units[i].id.value == id)
-      return file.source + ":" + std::to_string(file.lines[i]) + ": ";
+      return PlaceIn(file.source, file.lines[i]) + ": ";
   return file.source + ": ";
 }
 
@@ -92,7 +93,8 @@ Result<UnitsFile> ReadUnits(std::string_view text, std::string file) {
                                 "theta_min_deg", "theta_max_deg", "phi_min_deg", "phi_max_deg"}));
   UnitsFile units;
   units.source = table.file();
-  units.columns = table.columns();
+  for (std::size_t column = 0; column < table.columns().size(); ++column)
+    units.columns.push_back(table.known_as(column));
   units.ignored_columns =
       table.Others({"unit_id",           "base_x_mm",      "base_y_mm",     "arm_theta_mm",
                     "arm_phi_mm",        "theta_zero_deg", "phi_zero_deg",  "theta_gear",
@@ -108,7 +110,7 @@ Result<UnitsFile> ReadUnits(std::string_view text, std::string file) {
     if (const std::string fault = FaultOf(unit); !fault.empty())
       return row.RejectRow(name + fault, fault.substr(0, fault.find(' ')) + " out of bounds");
     if (const auto [it, fresh] = line_of.emplace(unit.id, row.line()); !fresh)
-      return row.RejectRow(name + "is there twice, first in line " + std::to_string(it->second),
+      return row.RejectRow(name + "is there twice, first in " + LineOrRow(it->second),
                            "is there twice");
     units.units.push_back(unit);
     units.lines.push_back(row.line());

@@ -3,6 +3,7 @@
 #include <unordered_map>
 
 #include "fleet/files/csv.h"
+#include "fleet/files/place.h"
 
 namespace focalfleet {
 
@@ -20,7 +21,7 @@ Result<std::vector<Obstacle>> ReadObstacles(std::string_view text, std::string f
     if (row.error()) return;
     if (const auto [it, fresh] = line_of.emplace(obstacle.id, row.line()); !fresh)
       return row.RejectRow("obstacle " + std::to_string(obstacle.id) +
-                               ": is there twice, first in line " + std::to_string(it->second),
+                               ": is there twice, first in " + LineOrRow(it->second),
                            "is there twice");
     obstacles.push_back(obstacle);
   }));

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fleet/files/csv.h"
+#include "fleet/files/place.h"
 #include "protocol/base/check.h"
 
 namespace focalfleet {
@@ -75,7 +76,7 @@ Status CheckJoins(const std::string& file, const std::vector<PlanRow>& rows) {
     if (before.unit != later.unit || before.axis != later.axis) continue;
     const std::string fault = JoinFault(before, later);
     if (fault.empty()) continue;
-    std::string text = file + ":" + std::to_string(later.line) + ": unit ";
+    std::string text = PlaceIn(file, later.line) + ": unit ";
     text += std::to_string(later.unit.value) + " " + Name(later.axis) + ": " + fault;
     bad.Add(text, "does not join up");
   }

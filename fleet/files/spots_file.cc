@@ -8,6 +8,7 @@
 
 #include "fleet/files/csv.h"
 #include "fleet/files/line_limit.h"
+#include "fleet/files/place.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {
@@ -144,8 +145,8 @@ Result<Exposure> ReadSpots(std::string_view text, std::string file, const Sensor
     const Spot spot = ReadSpot(&row, sensor);
     if (row.error()) return;
     if (const auto [it, fresh] = line_of.emplace(spot.id, row.line()); !fresh)
-      return row.RejectRow("spot " + std::to_string(spot.id) + ": is there twice, first in line " +
-                               std::to_string(it->second),
+      return row.RejectRow("spot " + std::to_string(spot.id) + ": is there twice, first in " +
+                               LineOrRow(it->second),
                            "is there twice");
     exposure.spots.push_back(spot);
   }));

@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "fleet/files/csv.h"
+#include "fleet/files/place.h"
 #include "fleet/kinematics.h"
 #include "protocol/base/check.h"
 #include "protocol/base/limits.h"
@@ -49,7 +50,7 @@ Result<std::vector<std::optional<Pose>>> ReadState(std::string_view text, std::s
     if (!index)
       return row.RejectRow(name + ": unknown unit, the layout has none such", "unknown unit");
     if (const auto [it, fresh] = line_of.emplace(index->value, row.line()); !fresh)
-      return row.RejectRow(name + ": named twice, first in line " + std::to_string(it->second),
+      return row.RejectRow(name + ": named twice, first in " + LineOrRow(it->second),
                            "named twice");
     const UnitDrive& drive = drives[index->value];
     Pose pose{};

@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "fleet/files/csv.h"
+#include "fleet/files/place.h"
 #include "fleet/kinematics.h"
 #include "protocol/base/check.h"
 
@@ -54,7 +55,7 @@ Result<Targets> ReadTargets(std::string_view text, std::string file) {
     if (row.error()) return;
     if (const auto [it, fresh] = line_of.emplace(target.unit, target.line); !fresh)
       return row.RejectRow("unit " + std::to_string(target.unit.value) +
-                               ": named twice, first in line " + std::to_string(it->second),
+                               ": named twice, first in " + LineOrRow(it->second),
                            "named twice");
     targets.rows.push_back(std::move(target));
   }));

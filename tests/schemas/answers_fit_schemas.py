@@ -19,6 +19,9 @@ import time
 
 import jsonschema
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "daemon" / "observatory"))
+import make_files  # noqa: E402
+
 WAIT_S = 120  # limit of every wait; a loaded machine needs far less
 UNITS = 19  # a whole hexagon: a simulated campaign has the same places
 SLOW = {"reproduce"}  # half a minute of a core
@@ -189,6 +192,13 @@ def prepare(s):
     s.ask(f"plan {fleet} --out plan.csv --plot plan.html", exits=(0, 3))
     s.ask(f"plan {fleet} --out plan.csv --least-energy --rail-limit-w 0.4", exits=(0, 3))
     s.ask(f"estimate {fleet} --out curve.csv", exits=(0, 3))
+    for project, layout in (("desi", "desi/calib.csv"),
+                            ("sdss", "sdss/positionerTable.csv sdss/wokCoords.csv"),
+                            ("pfs", "pfs/SC01.xml"), ("moons", "moons/positioners.cfg")):
+        os.mkdir(project)
+        make_files.make(project, project, 19)
+        s.ask(f"import {project} --layout {layout} --out {project}/plate", command=f"import {project}")
+        s.ask(f"export {project} --import {project}/plate --out {project}/out", command=f"export {project}")
     s.ask("simulate campaign --units 19 --moves 60 --effect backlash:theta=0.3 --out campaign",
           command="simulate campaign")
     renumber("campaign", "units.csv")

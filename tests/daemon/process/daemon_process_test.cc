@@ -172,7 +172,7 @@ TEST_F(FocalfleetdTest, ReportsFaultsOfItsFilesAndTouchesNothing) {
   std::ofstream(scratch_ / "units.fits") << "SIMPLE  =                    T";
   Configure("[bus]\nport = \"simulated\"\n[fleet]\nunits = \"units.fits\"\n");
   EXPECT_EQ(Start("fits").Wait(), 1);
-  EXPECT_THAT(Log("fits"), HasSubstr("units.fits: this is a FITS file"));
+  EXPECT_THAT(Log("fits"), HasSubstr("units.fits: unit 0: its header does not end"));
   Configure("[buss]\n");
   EXPECT_EQ(Start("b").Wait(), 1);
   EXPECT_THAT(Log("b"), HasSubstr("f.toml:3: unknown key 'buss'"));

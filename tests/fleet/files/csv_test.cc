@@ -81,9 +81,84 @@ TEST(Csv, RefusesFilesNamingLineAndReason) {
   EXPECT_EQ(ErrorOf("a,a\n"), "a.csv:1: column 'a' is there twice");
   EXPECT_EQ(ErrorOf(std::string_view("a\n1\n\0\n", 6)), "a.csv:3: not a text file (byte 0x00)");
   EXPECT_EQ(ErrorOf("a\x1f\n"), "a.csv:1: not a text file (byte 0x1f)");
-  EXPECT_EQ(ErrorOf("unit_id;x_mm\n1;2,5\n"),
-            "a.csv:1: the header 'unit_id;x_mm' is one column: cells are to be separated by "
-            "commas");
+}
+
+TEST(Csv, SemicolonsTabsAndBlanksSeparateCellsWhereNoCommaDoes) {
+  const CsvTable semicolons = Parsed("unit_id;x_mm;\"a;b\"\n1;2,5;\"c;d\"\n;;\n2;-1,5D1;\n");
+  ASSERT_EQ(semicolons.size(), 2u);
+  EXPECT_EQ(CsvRow(semicolons, 0).Number("x_mm"), 2.5) << "a decimal comma";
+  EXPECT_EQ(CsvRow(semicolons, 1).Number("x_mm"), -15);
+  EXPECT_EQ(CsvRow(semicolons, 0).Text("a;b"), "c;d");
+  const CsvTable tabs = Parsed("unit_id\tx_mm\tname\n1\t\ta b\n");
+  EXPECT_FALSE(CsvRow(tabs, 0).Has("x_mm"));
+  EXPECT_EQ(CsvRow(tabs, 0).Text("name"), "a b");
+  const CsvTable blanks = Parsed("unit_id  x_mm\n   1     2\n\n10 3  \n");
+  ASSERT_EQ(blanks.size(), 2u);
+  EXPECT_EQ(CsvRow(blanks, 1).Number("x_mm"), 3);
+  const CsvTable commas = Parsed("unit_id,a;b\n1,2;3\n");
+  EXPECT_EQ(CsvRow(commas, 0).Text("a;b"), "2;3") << "a semicolon beside commas is part of a name";
+  EXPECT_EQ(CsvRow(Parsed("a\rb\r"), 0).Text("a"), "b") << "lines of an old Macintosh";
+}
+
+TEST(Csv, NumbersOfFortranAndWordsForMissingOnesAreKnown) {
+  const CsvTable table = Parsed("a,b,c,d,e\n1.5D+03,-2d-1,1D,D5,1.5E+03\nNULL,n/a,--,None,<NA>\n");
+  CsvRow row(table, 0);
+  EXPECT_EQ(row.Number("a"), 1500);
+  EXPECT_EQ(row.Number("b"), -0.2);
+  EXPECT_EQ(row.Number("e"), 1500);
+  EXPECT_FALSE(row.error());
+  for (const char* wrong : {"c", "d"}) {
+    CsvRow other(table, 0);
+    other.Number(wrong);
+    EXPECT_TRUE(other.error()) << wrong;
+  }
+  for (const char* column : {"a", "b", "c", "d", "e"}) EXPECT_FALSE(CsvRow(table, 1).Has(column));
+}
+
+TEST(Csv, DeclaredUnitsAreConvertedToThoseOfTheNames) {
+  const CsvTable table = Parsed(
+      "# %ECSV 1.0\n# ---\n# datatype:\n# - {name: x_mm, unit: m, datatype: float64}\n"
+      "# - name: theta_deg\n#   unit: 'rad'\n# - {name: temp_C, unit: K}\n"
+      "# - {name: t_s, unit: furlong}\n# - {name: y_mm, unit: deg, description: 'a, b'}\n"
+      "# - {name: count, unit: m}\n# - {name: z_mm, unit: mm}\n"
+      "x_mm,theta_deg,temp_C,t_s,y_mm,count,z_mm\n0.5,3.141592653589793,280,1,2,3,4\n");
+  CsvRow row(table, 0);
+  EXPECT_DOUBLE_EQ(row.Number("x_mm"), 500);
+  EXPECT_DOUBLE_EQ(row.Number("theta_deg"), 180);
+  EXPECT_DOUBLE_EQ(row.Number("temp_C"), 280 - 273.15);
+  EXPECT_EQ(row.Number("count"), 3) << "a name without a unit";
+  EXPECT_EQ(row.NumberIn("count", "um"), 3e6);
+  EXPECT_EQ(row.Number("z_mm"), 4);
+  EXPECT_EQ(row.NumberOrFlagIfAny("y_mm"), 2) << "an unknown column is taken as it stands";
+  EXPECT_FALSE(row.error());
+  row.Number("y_mm");
+  ASSERT_TRUE(row.error());
+  EXPECT_EQ(row.error()->text,
+            "a.csv:13: column y_mm: its unit is 'deg', which cannot be converted to mm");
+  CsvRow other(table, 0);
+  other.Number("t_s");
+  EXPECT_TRUE(other.error()) << "a unit that nobody knows";
+}
+
+TEST(Csv, NamesInCapitalsAreKnownInSmallLetters) {
+  const CsvTable table = Parsed("UNIT_ID,X_MM,V_BUS_V,pos_T,x_mm\n1,2,3,4,5\n");
+  CsvRow row(table, 0);
+  EXPECT_EQ(row.Number("unit_id"), 1);
+  EXPECT_EQ(row.Number("UNIT_ID"), 1);
+  EXPECT_EQ(row.Number("v_bus_V"), 3);
+  EXPECT_EQ(row.Number("x_mm"), 5) << "the column of that very name";
+  EXPECT_EQ(row.Number("X_MM"), 2);
+  EXPECT_FALSE(row.Has("pos_t"));
+  EXPECT_EQ(table.Others({"unit_id", "v_bus_V", "x_mm"}),
+            (std::vector<std::string>{"X_MM", "pos_T"}));
+}
+
+TEST(Csv, PlacesOfAnotherFileAreNamedInMessages) {
+  const CsvTable table = Parsed("# %ECSV 1.0\n#@ -1\na,b\n#@ -1\n1,2\n#@ 40\n3,x\n");
+  EXPECT_EQ(table.line(0), -1);
+  EXPECT_EQ(table.ErrorAt(0, "why").text, "a.csv: row 1: why");
+  EXPECT_EQ(table.ErrorAt(1, "why").text, "a.csv:40: why");
+  EXPECT_EQ(table.Require({"c"}).error().text, "a.csv: column c is missing; there are: a, b");
 }
 
 TEST(Csv, TellsAllRowsOfAnotherWidth) {
