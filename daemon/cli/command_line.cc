@@ -175,8 +175,9 @@ CLI::Validator NumberBetween(double low, double high) {
           fmt::format("from {:.12g} to {:.12g}", low, high)};
 }
 
-std::unique_ptr<CommandLine> MakeCommandLine() {
+std::unique_ptr<CommandLine> MakeCommandLine(AddStudy add_study) {
   auto line = std::make_unique<CommandLine>();
+  line->add_study = add_study;
   CLI::App& app = line->app;
   app.name("focalfleet");
   app.description(
@@ -200,11 +201,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddWatchCommand(line.get());
   AddStopCommand(line.get());
   AddUnitCommands(line.get());
-  AddSimulateCommand(line.get());
-  AddDiagnoseCommand(line.get());
-  AddTuneCommand(line.get());
-  AddReproduceCommand(line.get());
-  AddHallCommands(line.get());
+  add_study(line.get());
   AddMeasurementsCommand(line.get());
   AddCampaignCommands(line.get());
   AddModelCommands(line.get());
@@ -218,7 +215,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   return line;
 }
 
-std::vector<usage::ManualPage> Manual() {
+std::vector<usage::ManualPage> Manual(AddStudy add_study) {
   usage::ManualFrame frame{
       .closing = kClosing,
       .section = 1,
@@ -237,12 +234,12 @@ std::vector<usage::ManualPage> Manual() {
   for (const ExitCodeText& each : kExitCodeTexts)
     frame.exit_codes.emplace_back(std::to_string(static_cast<int>(each.code)),
                                   std::string(each.text) + ".");
-  return usage::ManualOf(MakeCommandLine()->app, frame);
+  return usage::ManualOf(MakeCommandLine(add_study)->app, frame);
 }
 
-int Main(int argc, char** argv) {
+int Main(int argc, char** argv, AddStudy add_study) {
   HoldStandardStreams();
-  const std::unique_ptr<CommandLine> line = MakeCommandLine();
+  const std::unique_ptr<CommandLine> line = MakeCommandLine(add_study);
   try {
     line->app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -17,21 +17,27 @@ namespace focalfleet::cli {
 
 using Run = std::function<ExitCode(const Context&)>;
 
+struct CommandLine;
+/// Adds the study commands: all of them with their options (study/study.h), or their names alone
+/// (study_program.h).
+using AddStudy = void (*)(CommandLine* line);
+
 struct CommandLine {
   CLI::App app;
   Context context;
   Run run;
+  AddStudy add_study = nullptr;
 };
 
 /// The complete tree.
-std::unique_ptr<CommandLine> MakeCommandLine();
+std::unique_ptr<CommandLine> MakeCommandLine(AddStudy add_study);
 
 /// The man pages of focalfleet and its commands.
-std::vector<usage::ManualPage> Manual();
+std::vector<usage::ManualPage> Manual(AddStudy add_study);
 
 /// Parses the command line and runs the command. Returns the exit code; the reason of a failure is
 /// on stderr.
-int Main(int argc, char** argv);
+int Main(int argc, char** argv, AddStudy add_study);
 
 // ---- Functions for the files that add commands
 
@@ -68,14 +74,8 @@ void AddStatusCommands(CommandLine* line);  // status, unit, state, history
 void AddWatchCommand(CommandLine* line);
 void AddStopCommand(CommandLine* line);
 void AddUnitCommands(CommandLine* line);  // home, disable, enable, adopt, params
-void AddSimulateCommand(CommandLine* line);
-void AddSimulateCampaign(CLI::App* parent, CommandLine* line);
-void AddDiagnoseCommand(CommandLine* line);
-void AddTuneCommand(CommandLine* line);
-void AddReproduceCommand(CommandLine* line);
 void AddCampaignCommands(CommandLine* line);
 void AddCanCommands(CommandLine* line);
-void AddHallCommands(CommandLine* line);
 void AddMeasurementsCommand(CommandLine* line);
 void AddModelCommands(CommandLine* line);
 void AddStoreCommands(CommandLine* line);

@@ -220,11 +220,12 @@ fi
 )zsh";
 
 struct CompletionOptions {
+  AddStudy add_study = nullptr;
   std::string shell;
 };
 
 ExitCode RunCompletion(const Context& context, const CompletionOptions& options) {
-  const std::unique_ptr<CommandLine> line = MakeCommandLine();
+  const std::unique_ptr<CommandLine> line = MakeCommandLine(options.add_study);
   const std::string script = options.shell == "fish"  ? FishCompletion(line->app)
                              : options.shell == "zsh" ? ZshCompletion(line->app)
                                                       : BashCompletion(line->app);
@@ -276,6 +277,7 @@ void AddCompletionCommand(CommandLine* line) {
                  "  focalfleet completion zsh > ~/.zfunc/_focalfleet\n"
                  "  focalfleet completion fish > ~/.config/fish/completions/focalfleet.fish");
   auto options = std::make_shared<CompletionOptions>();
+  options->add_study = line->add_study;
   OneOf(command->add_option("shell", options->shell, "Which shell"), {"bash", "zsh", "fish"})
       ->required();
   OnChosen(line, command, options, RunCompletion);

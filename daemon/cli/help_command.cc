@@ -11,6 +11,7 @@ namespace focalfleet::cli {
 namespace {
 
 struct HelpOptions {
+  AddStudy add_study = nullptr;
   std::vector<std::string> command;
 };
 
@@ -40,7 +41,7 @@ void Append(const CLI::App& app, Json* commands) {
 }
 
 ExitCode RunHelp(const Context& context, const HelpOptions& options) {
-  const std::unique_ptr<CommandLine> line = MakeCommandLine();
+  const std::unique_ptr<CommandLine> line = MakeCommandLine(options.add_study);
   const CLI::App* app = &line->app;
   for (const std::string& word : options.command) {
     const CLI::App* next = nullptr;
@@ -69,6 +70,7 @@ void AddHelpCommand(CommandLine* line) {
       AddCommand(&line->app, "help", "Show the help of a command",
                  "  focalfleet help apply\n  focalfleet help layout hex\n  focalfleet help --json");
   auto options = std::make_shared<HelpOptions>();
+  options->add_study = line->add_study;
   std::vector<std::string> names;
   for (const CLI::App* other : line->app.get_subcommands({})) names.push_back(other->get_name());
   // The names are for completion; a wrong one is answered with the nearest.

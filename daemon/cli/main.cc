@@ -1,3 +1,3 @@
-#include "daemon/cli/command_line.h"
+#include "daemon/cli/study_program.h"
 
-int main(int argc, char** argv) { return focalfleet::cli::Main(argc, argv); }
+int main(int argc, char** argv) { return focalfleet::cli::RunProgram(argc, argv); }

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "protocol/base/result.h"
-#include "sim/hall/field_fit.h"
+#include "sim/hall/field_model.h"
 #include "sim/hall/rig.h"
 
 namespace focalfleet {

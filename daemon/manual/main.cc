@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/cli/command_line.h"
+#include "daemon/study/study.h"
 #include "daemon/files/text_file.h"
 #include "daemon/process/command_line.h"
 #include "daemon/process/config_manual.h"
@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using focalfleet::usage::ManualPage;
 
 std::vector<ManualPage> AllPages() {
-  std::vector<ManualPage> pages = focalfleet::cli::Manual();
+  std::vector<ManualPage> pages = focalfleet::cli::Manual(focalfleet::cli::AddStudyCommands);
   for (const auto& more : {focalfleet::DaemonManual(), focalfleet::simulator::Manual()})
     pages.insert(pages.end(), more.begin(), more.end());
   pages.push_back(focalfleet::ConfigManual());

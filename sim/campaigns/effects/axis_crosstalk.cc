@@ -4,13 +4,13 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListAxisCrosstalk(const CampaignFacts&, Templates* out) {
   ListGrid({.memories = {Memory::kChain, Memory::kNow}}, out);
   ListGrid({.memories = {Memory::kHold, Memory::kNow}, .form = 1}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyAxisCrosstalk(const UnitTrack& track, const Template& form,
+                        std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::size_t other = axis == kTheta ? kPhi : kTheta;
   const std::span<const double> step = track.step_deg[other];
@@ -35,8 +35,8 @@ Effect MakeAxisCrosstalk() {
           .paragraph =
               "Moving one axis turns the other a little: the fibre bundle's torque, a shared "
               "shaft, or a bearing's drag. Move the axes one after the other to see it.",
-          .list = List,
-          .apply = Apply};
+          .list = ListAxisCrosstalk,
+          .apply = ApplyAxisCrosstalk};
 }
 
 }  // namespace focalfleet::sim

@@ -7,13 +7,13 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListAxisTilt(const CampaignFacts&, Templates* out) {
   ListGrid({.columns = 2}, out);
   ListGrid({.form = 1, .columns = 2}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyAxisTilt(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                   PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   constexpr double kRadians = std::numbers::pi / 180;
   for (std::size_t i = 0; i < track.moves; ++i) {
@@ -51,8 +51,8 @@ Effect MakeAxisTilt() {
               "An axis leans, so that the camera sees its circle as an ellipse: an error of "
               "two periods a turn, along one direction. The lean is the unit's own; a "
               "distortion of the camera looks alike on one unit, not on a plate full of them.",
-          .list = List,
-          .apply = Apply};
+          .list = ListAxisTilt,
+          .apply = ApplyAxisTilt};
 }
 
 }  // namespace focalfleet::sim

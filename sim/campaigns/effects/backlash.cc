@@ -6,13 +6,13 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListBacklash(const CampaignFacts&, Templates* out) {
   ListGrid({.shapes = {0, 0.1, 0.3, 1, 3}, .shape_name = "gap, deg,"}, out);
   ListGrid({.memories = {Memory::kNow}}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyBacklash(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                   PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   const double half_deg = form.shape / 2;
@@ -42,8 +42,8 @@ Effect MakeBacklash() {
               "the arm follows, so that the arm rests on one side of the gap or on the other. "
               "Approach always from one side, or command the gap in addition after a "
               "reversal.",
-          .list = List,
-          .apply = Apply,
+          .list = ListBacklash,
+          .apply = ApplyBacklash,
           .continuous_shape = true,
           .amplitude_is_shape = true};
 }

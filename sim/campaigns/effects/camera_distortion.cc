@@ -4,7 +4,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListCameraDistortion(const CampaignFacts& facts, Templates* out) {
   if (facts.campaign->units.size() < 4) return;
   out->push_back({.axis = EffectAxis::kNone, .label = "radial, third order"});
   out->push_back({.axis = EffectAxis::kNone, .columns = 2, .form = 1, .label = "decentred"});
@@ -15,8 +15,8 @@ void List(const CampaignFacts& facts, Templates* out) {
   out->push_back({.axis = EffectAxis::kNone, .columns = 8, .form = 3, .label = "any third order"});
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyCameraDistortion(const UnitTrack& track, const Template& form,
+                           std::span<const double> amplitude, PoseErrors* errors) {
   const CampaignFacts& facts = *track.facts;
   for (std::size_t i = 0; i < track.moves; ++i) {
     const double x = track.fibre_x_mm[i] / facts.radius_mm;
@@ -57,8 +57,8 @@ Effect MakeCameraDistortion() {
               "The camera's lens maps the plate with a distortion that its model lacks: "
               "displacements that grow with the third power of the distance from its centre, "
               "the same at every exposure.",
-          .list = List,
-          .apply = Apply};
+          .list = ListCameraDistortion,
+          .apply = ApplyCameraDistortion};
 }
 
 }  // namespace focalfleet::sim

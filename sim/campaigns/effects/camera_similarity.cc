@@ -5,7 +5,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListCameraSimilarity(const CampaignFacts& facts, Templates* out) {
   constexpr std::size_t kPlaces = 24;
   const std::size_t exposures = facts.exposures.size();
   if (exposures < 8 || facts.campaign->units.size() < 3) return;
@@ -19,8 +19,8 @@ void List(const CampaignFacts& facts, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyCameraSimilarity(const UnitTrack& track, const Template& form,
+                           std::span<const double> amplitude, PoseErrors* errors) {
   for (std::size_t i = 0; i < track.moves; ++i) {
     const std::size_t exposure = track.facts->exposures.of_row[track.RowOf(i)];
     if (static_cast<double>(exposure) < form.shape) continue;
@@ -40,8 +40,8 @@ Effect MakeCameraSimilarity() {
           .paragraph =
               "The whole image has shifted at one moment: the camera or its mount was touched. Tie "
               "each exposure to fiducials.",
-          .list = List,
-          .apply = Apply,
+          .list = ListCameraSimilarity,
+          .apply = ApplyCameraSimilarity,
           .continuous_shape = true};
 }
 

@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListCentroidBias(const CampaignFacts& facts, Templates* out) {
   (void)facts;
   out->push_back({.axis = EffectAxis::kNone, .columns = 2, .label = "period of one pixel"});
   out->push_back({.axis = EffectAxis::kNone,
@@ -16,8 +16,8 @@ void List(const CampaignFacts& facts, Templates* out) {
                   .label = "period of one pixel, other in y than in x"});
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyCentroidBias(const UnitTrack& track, const Template& form,
+                       std::span<const double> amplitude, PoseErrors* errors) {
   constexpr double kTurn = 2 * std::numbers::pi;
   const std::span<const double> x = track.Column("pixel_x");
   const std::span<const double> y = track.Column("pixel_y");
@@ -40,8 +40,8 @@ Effect MakeCentroidBias() {
           .paragraph =
               "The measured centre of a spot depends on where in a pixel it falls. Dither the "
               "camera by half a pixel, or fit the spot's true shape.",
-          .list = List,
-          .apply = Apply};
+          .list = ListCentroidBias,
+          .apply = ApplyCentroidBias};
 }
 
 }  // namespace focalfleet::sim

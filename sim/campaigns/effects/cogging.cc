@@ -10,7 +10,7 @@ namespace {
 // lag)) the k-th harmonic of the lag falls with U^k.
 constexpr int kBent = 3;
 
-void List(const CampaignFacts&, Templates* out) {
+void ListCogging(const CampaignFacts&, Templates* out) {
   for (const int power : {1, 2})
     ListGrid({.shapes = {1, 2, 4, 6},
               .shape_name = power == 1 ? "falls with the drive; motor harmonic"
@@ -25,8 +25,8 @@ void List(const CampaignFacts&, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyCogging(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                  PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const FallsWithDrive falls =
       form.form == kBent ? FallsWithDrive{1, 1} : FallsWithDrive{static_cast<double>(form.form), 0};
@@ -45,8 +45,8 @@ Effect MakeCogging() {
               "The rotor prefers certain angles; the weaker the drive, the more. A ripple "
               "with the motor's own order that falls with the drive level. A stronger hold at "
               "the end of the move removes it.",
-          .list = List,
-          .apply = Apply,
+          .list = ListCogging,
+          .apply = ApplyCogging,
           // At one drive level the pull of the poles is a ripple like that of the phases.
           .passes_for = {"phase_imbalance"}};
 }

@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListCollisionContact(const CampaignFacts& facts, Templates* out) {
   if (!facts.Has(kArmGap)) return;
   ListGrid({.axes = {EffectAxis::kPhi},
             .shapes = {0.08, 0.12, 0.16, 0.24},
@@ -15,8 +15,8 @@ void List(const CampaignFacts& facts, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyCollisionContact(const UnitTrack& track, const Template& form,
+                           std::span<const double> amplitude, PoseErrors* errors) {
   const std::span<const double> gap_mm = track.Column(kArmGap);
   const std::span<const double> side = track.Column(kArmGapSide);
   const double thick_mm = form.shape * track.facts->pitch_mm;
@@ -38,8 +38,8 @@ Effect MakeCollisionContact() {
           .paragraph =
               "Neighbouring arms touch, and phi is pushed aside by what they overlap: move "
               "these targets apart, and look at the arms.",
-          .list = List,
-          .apply = Apply,
+          .list = ListCollisionContact,
+          .apply = ApplyCollisionContact,
           .continuous_shape = true,
           .amplitude_low = 0,
           .amplitude_high = 1.5};

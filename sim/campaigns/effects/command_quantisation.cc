@@ -16,23 +16,23 @@ enum class Rounding {
              // average
 };
 /// A template's form is its index in the table, and model files store it.
-struct Form {
+struct RoundingForm {
   Step step;
   Rounding rounding;
   std::string_view name;
 };
 constexpr std::array kForms = {
-    Form{Step::kDegrees, Rounding::kNearest, "step, deg,"},
-    Form{Step::kDegrees, Rounding::kCutMove, "moves are cut; step, deg,"},
-    Form{Step::kMotorTurns, Rounding::kNearest, "steps a motor turn:"},
-    Form{Step::kBits, Rounding::kNearest, "bits a turn:"},
-    Form{Step::kBits, Rounding::kCutMove, "moves are cut; bits a turn:"},
-    Form{Step::kDegrees, Rounding::kDown, "rounded down; step, deg,"},
-    Form{Step::kBits, Rounding::kDown, "rounded down; bits a turn:"},
-    Form{Step::kDegrees, Rounding::kCutMean, "moves are cut; on average; step, deg,"},
+    RoundingForm{Step::kDegrees, Rounding::kNearest, "step, deg,"},
+    RoundingForm{Step::kDegrees, Rounding::kCutMove, "moves are cut; step, deg,"},
+    RoundingForm{Step::kMotorTurns, Rounding::kNearest, "steps a motor turn:"},
+    RoundingForm{Step::kBits, Rounding::kNearest, "bits a turn:"},
+    RoundingForm{Step::kBits, Rounding::kCutMove, "moves are cut; bits a turn:"},
+    RoundingForm{Step::kDegrees, Rounding::kDown, "rounded down; step, deg,"},
+    RoundingForm{Step::kBits, Rounding::kDown, "rounded down; bits a turn:"},
+    RoundingForm{Step::kDegrees, Rounding::kCutMean, "moves are cut; on average; step, deg,"},
 };
 
-std::vector<double> ShapesOf(const Form& form) {
+std::vector<double> ShapesOf(const RoundingForm& form) {
   const Step step = form.step;
   // An amplitude of 0.5 to 1.5 reaches from each of these to the next.
   if (form.rounding == Rounding::kCutMean) return {0.001, 0.002, 0.004, 0.008};
@@ -41,16 +41,16 @@ std::vector<double> ShapesOf(const Form& form) {
   return {0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2};
 }
 
-bool IsCut(const Form& form) {
+bool IsCut(const RoundingForm& form) {
   return form.rounding == Rounding::kCutMove || form.rounding == Rounding::kCutMean;
 }
 
-double Step_deg(const Form& form, double shape, double gear) {
+double Step_deg(const RoundingForm& form, double shape, double gear) {
   if (form.step == Step::kMotorTurns) return 360 / (shape * gear);
   return form.step == Step::kBits ? 360 / std::exp2(shape) : shape;
 }
 
-void List(const CampaignFacts&, Templates* out) {
+void ListCommandQuantisation(const CampaignFacts&, Templates* out) {
   for (std::size_t k = 0; k < kForms.size(); ++k)
     ListGrid(
         {.shapes = ShapesOf(kForms[k]), .shape_name = kForms[k].name, .form = static_cast<int>(k)},
@@ -80,10 +80,10 @@ void OfPeriod(double period_deg, Templates* out) {
                out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyCommandQuantisation(const UnitTrack& track, const Template& form,
+                              std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
-  const Form& kind = kForms[static_cast<std::size_t>(form.form)];
+  const RoundingForm& kind = kForms[static_cast<std::size_t>(form.form)];
   const std::optional<double> shape = ShapeOf(form, track.unit->id);
   if (!shape || !(*shape > 0)) return;
   const double step_deg = Step_deg(kind, *shape, track.unit->gear[axis]);
@@ -114,8 +114,8 @@ Effect MakeCommandQuantisation() {
               "The command is rounded (or cut, or rounded down) to a step of the controller, so "
               "that the error is a saw-tooth of the command. It adds up if each move is rounded "
               "by itself.",
-          .list = List,
-          .apply = Apply,
+          .list = ListCommandQuantisation,
+          .apply = ApplyCommandQuantisation,
           .glance = Glance,
           .of_period = OfPeriod,
           .own_shape = true,

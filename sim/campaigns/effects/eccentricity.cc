@@ -5,10 +5,10 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) { ListGrid({.columns = 2}, out); }
+void ListEccentricity(const CampaignFacts&, Templates* out) { ListGrid({.columns = 2}, out); }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyEccentricity(const UnitTrack& track, const Template& form,
+                       std::span<const double> amplitude, PoseErrors* errors) {
   AddHarmonic(track, AxisIndex(form), 1.0, amplitude, errors);
 }
 
@@ -24,8 +24,8 @@ Effect MakeEccentricity() {
               "The output gear or its bearing is off centre, so that the angle errs as a sine "
               "of one period a turn, the same in both directions. Its phase is the unit's "
               "own.",
-          .list = List,
-          .apply = Apply};
+          .list = ListEccentricity,
+          .apply = ApplyEccentricity};
 }
 
 }  // namespace focalfleet::sim

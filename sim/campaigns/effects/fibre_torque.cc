@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kLinear = 0.3, kFriction = 0.2;  // shares beside the cubic term
 
-void List(const CampaignFacts&, Templates* out) {
+void ListFibreTorque(const CampaignFacts&, Templates* out) {
   ListGrid({}, out);
   ListGrid({.form = 1}, out);
   ListGrid({.form = 2}, out);
@@ -18,8 +18,8 @@ void List(const CampaignFacts&, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyFibreTorque(const UnitTrack& track, const Template& form,
+                      std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const CampaignUnit& unit = *track.unit;
   const double middle_deg = (unit.min_deg[axis] + unit.max_deg[axis]) / 2;
@@ -52,8 +52,8 @@ Effect MakeFibreTorque() {
           .paragraph =
               "The twisted fibre pulls the axis back, the more the farther it is turned, and "
               "not quite the same on the way back. Re-route the fibre or limit the range.",
-          .list = List,
-          .apply = Apply,
+          .list = ListFibreTorque,
+          .apply = ApplyFibreTorque,
           .continuous_shape = true};
 }
 

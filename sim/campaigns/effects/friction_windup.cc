@@ -6,12 +6,12 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListFrictionWindup(const CampaignFacts&, Templates* out) {
   ListGrid({.shapes = {0.5, 2, 6, 20}, .shape_name = "over a travel of, deg,"}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyFrictionWindup(const UnitTrack& track, const Template& form,
+                         std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   double twist = 0;
@@ -38,8 +38,8 @@ Effect MakeFrictionWindup() {
               "Friction twists the drive train like a spring. After a reversal the twist "
               "unwinds and winds up the other way over some degrees of travel, so that short "
               "moves after a reversal err less than long ones.",
-          .list = List,
-          .apply = Apply,
+          .list = ListFrictionWindup,
+          .apply = ApplyFrictionWindup,
           .continuous_shape = true};
 }
 

@@ -4,12 +4,12 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListGearScale(const CampaignFacts&, Templates* out) {
   ListGrid({.memories = {Memory::kChain, Memory::kNow}}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyGearScale(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                    PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   AddRemembered(
@@ -30,8 +30,8 @@ Effect MakeGearScale() {
               "or an axis that loses motion in proportion to what it moves. Open loop the "
               "error grows with the distance from where the unit was homed. Calibrate the "
               "ratio, and look at the gear if one unit stands out.",
-          .list = List,
-          .apply = Apply,
+          .list = ListGearScale,
+          .apply = ApplyGearScale,
           .amplitude_low = -1,  // an axis that stands still
           .amplitude_high = 0.5};
 }

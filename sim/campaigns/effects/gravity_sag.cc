@@ -7,15 +7,15 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListGravitySag(const CampaignFacts& facts, Templates* out) {
   (void)facts;
   out->push_back({.axis = EffectAxis::kNone, .label = "all fibres alike"});
   out->push_back(
       {.axis = EffectAxis::kNone, .columns = 2, .form = 1, .label = "in a free direction"});
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyGravitySag(const UnitTrack& track, const Template& form,
+                     std::span<const double> amplitude, PoseErrors* errors) {
   const std::span<const double> elevation = track.Column("elevation_deg");
   for (std::size_t i = 0; i < track.moves; ++i) {
     const double along = std::cos(elevation[i] * std::numbers::pi / 180) * 1e-3;
@@ -36,8 +36,8 @@ Effect MakeGravitySag() {
           .paragraph =
               "The plate or the camera's mount sinks under gravity: all fibres shift the same "
               "way, in proportion to gravity's part along the plate.",
-          .list = List,
-          .apply = Apply,
+          .list = ListGravitySag,
+          .apply = ApplyGravitySag,
           // Without elevations a plate that sags is a shift of the image.
           .passes_for = {"camera_similarity"}};
 }

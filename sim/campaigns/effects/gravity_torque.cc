@@ -11,7 +11,7 @@ namespace {
 // mostly in phi's motor at the elbow, whose lever turns with theta alone.
 constexpr double kElbowShare = 0.75;
 
-void List(const CampaignFacts&, Templates* out) {
+void ListGravityTorque(const CampaignFacts&, Templates* out) {
   // Shapes range from a spring, which yields in proportion to the torque, to play, which depends on
   // its sign alone.
   for (const int form : {0, 1})
@@ -22,8 +22,8 @@ void List(const CampaignFacts&, Templates* out) {
              out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyGravityTorque(const UnitTrack& track, const Template& form,
+                        std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> elevation = track.Column("elevation_deg");
   const double elbow = form.form == 1 && axis == kTheta ? kElbowShare : 0.5;
@@ -53,8 +53,8 @@ Effect MakeGravityTorque() {
               "The weight of the arm presses the gears to one side of their clearance. The "
               "side changes where the arm crosses the vertical, and the effect vanishes at "
               "the zenith.",
-          .list = List,
-          .apply = Apply,
+          .list = ListGravityTorque,
+          .apply = ApplyGravityTorque,
           .continuous_shape = true,
           // At one elevation the side of the gears goes with the angle alone.
           .passes_for = {"eccentricity"}};

@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListHardStop(const CampaignFacts&, Templates* out) {
   const std::vector<double> begins_deg = {1, 2, 4, 7, 10, 13, 16, 20};
   ListGrid({.shapes = begins_deg, .shape_name = "upper end; begins before it by, deg,"}, out);
   ListGrid({.shapes = begins_deg, .shape_name = "lower end; begins before it by, deg,", .form = 1},
@@ -19,8 +19,8 @@ void List(const CampaignFacts&, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyHardStop(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                   PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const CampaignUnit& unit = *track.unit;
   const bool upper = form.form == 0 || form.form == 2, slips = form.form >= 2;
@@ -46,8 +46,8 @@ Effect MakeHardStop() {
           .paragraph =
               "Near an end of its range the axis is held back: the stop, or the clearance "
               "before it, begins earlier than the table says. Narrow the range of this unit.",
-          .list = List,
-          .apply = Apply,
+          .list = ListHardStop,
+          .apply = ApplyHardStop,
           .continuous_shape = true};
 }
 

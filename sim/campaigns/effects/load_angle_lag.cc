@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListLoadAngleLag(const CampaignFacts& facts, Templates* out) {
   // Forms 0 and 1 are a light load, 2 and 3 a heavy one, by the arcsine. Forms 1 and 3 depend on
   // the supply. The amplitude is the lag at nominal drive.
   const std::vector<double> loads = {0.5, 0.8, 0.95};
@@ -20,10 +20,10 @@ void List(const CampaignFacts& facts, Templates* out) {
 }
 
 // Beyond the pull-out the rotor does not lag, it slips.
-bool Shows(const Template& form, const CampaignFacts&) { return form.shape < 1; }
+bool ShowsLoadAngleLag(const Template& form, const CampaignFacts&) { return form.shape < 1; }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyLoadAngleLag(const UnitTrack& track, const Template& form,
+                       std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   const std::span<const double> drive = track.Column("drive_amplitude");
@@ -56,10 +56,10 @@ Effect MakeLoadAngleLag() {
               "Under friction the rotor stops behind the field that holds it, the more the "
               "weaker the drive. It looks like backlash as long as the drive level never "
               "changes.",
-          .list = List,
-          .apply = Apply,
+          .list = ListLoadAngleLag,
+          .apply = ApplyLoadAngleLag,
           .continuous_shape = true,
-          .shows = Shows,
+          .shows = ShowsLoadAngleLag,
           // At one drive level a lag is play.
           .passes_for = {"backlash"}};
 }

@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListModeThreshold(const CampaignFacts&, Templates* out) {
   const std::vector<double> lengths_deg = {1, 2, 3, 5, 10, 20, 40};
   ListGrid({.memories = {Memory::kHold, Memory::kNow},
             .shapes = lengths_deg,
@@ -23,7 +23,7 @@ void List(const CampaignFacts&, Templates* out) {
 
 // An error that adds up in nearly all moves belongs to another cause: most moves have to be longer
 // than the threshold.
-bool Shows(const Template& form, const CampaignFacts& facts) {
+bool ShowsModeThreshold(const Template& form, const CampaignFacts& facts) {
   constexpr double kLonger = 0.7;  // of the axis' moves
   if (form.memory != Memory::kChain) return true;
   double moves = 0, longer = 0;
@@ -34,8 +34,8 @@ bool Shows(const Template& form, const CampaignFacts& facts) {
   return longer >= kLonger * moves;
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyModeThreshold(const UnitTrack& track, const Template& form,
+                        std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   AddRemembered(
@@ -59,10 +59,10 @@ Effect MakeModeThreshold() {
           .paragraph =
               "Moves below a length run in another mode of the firmware (creep instead of "
               "cruise), which ends a little elsewhere: the error steps at that length.",
-          .list = List,
-          .apply = Apply,
+          .list = ListModeThreshold,
+          .apply = ApplyModeThreshold,
           .continuous_shape = true,
-          .shows = Shows};
+          .shows = ShowsModeThreshold};
 }
 
 }  // namespace focalfleet::sim

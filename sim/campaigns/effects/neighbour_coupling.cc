@@ -4,12 +4,12 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListNeighbourCoupling(const CampaignFacts& facts, Templates* out) {
   if (facts.Has(kNeighbourTheta)) ListGrid({}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyNeighbourCoupling(const UnitTrack& track, const Template& form,
+                            std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> pull =
       track.Column(axis == kTheta ? kNeighbourTheta : kNeighbourPhi);
@@ -28,8 +28,8 @@ Effect MakeNeighbourCoupling() {
           .paragraph =
               "The magnets of a neighbour's motor pull at this one's rotor, by the angle "
               "between the two and the cube of their distance.",
-          .list = List,
-          .apply = Apply};
+          .list = ListNeighbourCoupling,
+          .apply = ApplyNeighbourCoupling};
 }
 
 }  // namespace focalfleet::sim

@@ -14,7 +14,7 @@ namespace {
 constexpr FallsWithDrive kFalls[] = {{0, 0}, {1, 0}, {0, 0}, {1, 1}, {1, 0}};
 constexpr bool IsBent(int form) { return form >= 2; }
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListPhaseImbalance(const CampaignFacts& facts, Templates* out) {
   const auto list = [&](int form, std::vector<double> harmonics, const char* name) {
     ListGrid({.shapes = std::move(harmonics),
               .shape_name = name,
@@ -36,8 +36,8 @@ void List(const CampaignFacts& facts, Templates* out) {
   list(4, {6}, "bent, falls with the drive; motor harmonic");
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyPhaseImbalance(const UnitTrack& track, const Template& form,
+                         std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   AddMotorWave(track, axis, form.shape * track.unit->gear[axis], kFalls[form.form], amplitude,
                errors);
@@ -55,8 +55,8 @@ Effect MakePhaseImbalance() {
               "The three phases differ in offset or gain, or the bridge's dead time bends the "
               "voltages: a ripple of one, two or six periods a motor turn. That of gains does not "
               "know the drive level, the others fall with it.",
-          .list = List,
-          .apply = Apply};
+          .list = ListPhaseImbalance,
+          .apply = ApplyPhaseImbalance};
 }
 
 }  // namespace focalfleet::sim

@@ -5,11 +5,11 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) { ListGrid({.columns = 2}, out); }
+void ListPinionRunout(const CampaignFacts&, Templates* out) { ListGrid({.columns = 2}, out); }
 
 // Without an output stage the last pinion is the sun of the last planetary stage.
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyPinionRunout(const UnitTrack& track, const Template& form,
+                       std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const double ratio = PinionRatio(*track.unit, axis);
   AddHarmonic(track, axis, ratio > 1 ? ratio : kStageRatio, amplitude, errors);
@@ -27,8 +27,8 @@ Effect MakePinionRunout() {
               "The last pinion, or the carrier that it sits on, is off centre: a ripple of 2.65 "
               "periods a turn with an output stage, of 4.29 without. The two turn together, so "
               "that nothing but a gear of its own tells them apart.",
-          .list = List,
-          .apply = Apply};
+          .list = ListPinionRunout,
+          .apply = ApplyPinionRunout};
 }
 
 }  // namespace focalfleet::sim

@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListPlateExpansion(const CampaignFacts& facts, Templates* out) {
   out->push_back({.axis = EffectAxis::kNone, .label = "by each unit's temperature"});
   // A thick plate follows its units' temperature late.
   if (facts.Has("t_s"))
@@ -18,8 +18,8 @@ void List(const CampaignFacts& facts, Templates* out) {
              out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyPlateExpansion(const UnitTrack& track, const Template& form,
+                         std::span<const double> amplitude, PoseErrors* errors) {
   const std::span<const double> temperature = track.Column("temp_C");
   const CampaignFacts& facts = *track.facts;
   const double usual_C = facts.Find("temp_C")->mean;
@@ -44,8 +44,8 @@ Effect MakePlateExpansion() {
               "The focal plate grows with temperature and carries all units outwards, in "
               "proportion to their distance from its centre. Fiducials on the plate move with "
               "it.",
-          .list = List,
-          .apply = Apply,
+          .list = ListPlateExpansion,
+          .apply = ApplyPlateExpansion,
           .continuous_shape = true,
           // Without temperatures a plate that grows is a camera that scales.
           .passes_for = {"camera_similarity"}};

@@ -4,7 +4,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListPlateGradient(const CampaignFacts& facts, Templates* out) {
   if (facts.Has(kGradientX))
     out->push_back({.axis = EffectAxis::kNone, .form = 0, .label = "by the measured gradient"});
   for (const int form : {1, 2, 3})
@@ -16,8 +16,8 @@ void List(const CampaignFacts& facts, Templates* out) {
                                          : "along the gradient, by its square"});
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyPlateGradient(const UnitTrack& track, const Template& form,
+                        std::span<const double> amplitude, PoseErrors* errors) {
   const CampaignFacts& facts = *track.facts;
   const std::span<const double> temperature = track.Column("temp_C");
   const double usual_C = facts.Find("temp_C")->mean;
@@ -57,8 +57,8 @@ Effect MakePlateGradient() {
               "A temperature gradient across the plate bends its grid: displacements that "
               "grow with the square of the place on the plate, or stretch it one way. Even "
               "the temperature out, or correct by fiducials.",
-          .list = List,
-          .apply = Apply,
+          .list = ListPlateGradient,
+          .apply = ApplyPlateGradient,
           // The range is far beyond any metal's: sensors at the units see only a part of the
           // plate's gradient.
           .amplitude_low = -0.01,

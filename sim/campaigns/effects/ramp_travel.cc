@@ -6,7 +6,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListRampTravel(const CampaignFacts&, Templates* out) {
   ListGrid({.memories = {Memory::kChain}}, out);
   // Short moves never reach full speed.
   ListGrid({.memories = {Memory::kChain},
@@ -16,8 +16,8 @@ void List(const CampaignFacts&, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyRampTravel(const UnitTrack& track, const Template& form,
+                     std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   AddRemembered(
@@ -42,8 +42,8 @@ Effect MakeRampTravel() {
               "Each move ends a constant angle too far (or short), however long it was: "
               "motion in the ramps at its ends that the command does not count. As long as "
               "all moves have one length it looks like a scale error.",
-          .list = List,
-          .apply = Apply,
+          .list = ListRampTravel,
+          .apply = ApplyRampTravel,
           .amplitude_low = -10,
           .amplitude_high = 10};
 }

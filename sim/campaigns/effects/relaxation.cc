@@ -24,7 +24,7 @@ std::vector<double> RestTimes(const UnitTrack& track, std::size_t axis) {
   return rest;
 }
 
-void List(const CampaignFacts&, Templates* out) {
+void ListRelaxation(const CampaignFacts&, Templates* out) {
   // Form 0 is seen once, and then held. Form 1 goes by the exposure's delay, form 2 by the time
   // since the axis came to rest.
   const std::vector<double> times_s = {0.3, 1, 3, 10, 30, 100};
@@ -36,7 +36,7 @@ void List(const CampaignFacts&, Templates* out) {
 }
 
 // A creep that is over before the exposures looks like play.
-bool Shows(const Template& form, const CampaignFacts& facts) {
+bool ShowsRelaxation(const Template& form, const CampaignFacts& facts) {
   constexpr double kLeftMin = 0.15;  // of the creep, root mean square
   const std::vector<double>& delay_s = facts.Find("delay_s")->values;
   double square = 0;
@@ -44,8 +44,8 @@ bool Shows(const Template& form, const CampaignFacts& facts) {
   return square >= kLeftMin * kLeftMin * static_cast<double>(delay_s.size());
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyRelaxation(const UnitTrack& track, const Template& form,
+                     std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   const std::span<const double> delay = track.Column("delay_s");
@@ -81,10 +81,10 @@ Effect MakeRelaxation() {
               "After the motor has stopped the arm creeps back for seconds, against the "
               "direction of the move. Wait longer before the exposure, or expose always at "
               "the same delay.",
-          .list = List,
-          .apply = Apply,
+          .list = ListRelaxation,
+          .apply = ApplyRelaxation,
           .continuous_shape = true,
-          .shows = Shows,
+          .shows = ShowsRelaxation,
           // At one delay a creep that is not over is play.
           .passes_for = {"backlash"}};
 }

@@ -6,12 +6,12 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListScaleAsymmetry(const CampaignFacts&, Templates* out) {
   ListGrid({.memories = {Memory::kChain, Memory::kNow}}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyScaleAsymmetry(const UnitTrack& track, const Template& form,
+                         std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   AddRemembered(
@@ -31,8 +31,8 @@ Effect MakeScaleAsymmetry() {
               "The axis turns farther one way than the other for the same command, so that it "
               "creeps with every back and forth. Friction or a load with a preferred "
               "direction does this; so does a supply that is weaker one way.",
-          .list = List,
-          .apply = Apply};
+          .list = ListScaleAsymmetry,
+          .apply = ApplyScaleAsymmetry};
 }
 
 }  // namespace focalfleet::sim

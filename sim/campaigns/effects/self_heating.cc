@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kWinding_s = 15;  // the winding's own time constant
 
-void List(const CampaignFacts&, Templates* out) {
+void ListSelfHeating(const CampaignFacts&, Templates* out) {
   ListGrid({.shapes = {60, 180, 600, 1800}, .shape_name = "time constant, s,"}, out);
   // Two masses: the housing, and the winding that heats it.
   ListGrid({.shapes = {60, 180, 600, 1800},
@@ -29,8 +29,8 @@ void List(const CampaignFacts&, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplySelfHeating(const UnitTrack& track, const Template& form,
+                      std::span<const double> amplitude, PoseErrors* errors) {
   const std::span<const double> time = track.Column("t_s");
   const std::size_t axis = AxisIndex(form);
   std::span<const double> drive;
@@ -76,8 +76,8 @@ Effect MakeSelfHeating() {
           .paragraph =
               "Recent motion warms the motor, and the error follows that warmth with a time "
               "constant of minutes. Pause, or spread the moves.",
-          .list = List,
-          .apply = Apply,
+          .list = ListSelfHeating,
+          .apply = ApplySelfHeating,
           .continuous_shape = true};
 }
 

@@ -7,12 +7,12 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
+void ListStageRipple(const CampaignFacts&, Templates* out) {
   ListGrid({.shapes = {1, 2, 3}, .shape_name = "stages from the output:", .columns = 2}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyStageRipple(const UnitTrack& track, const Template& form,
+                      std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const double order = PinionRatio(*track.unit, axis) * std::pow(kStageRatio, form.shape);
   AddHarmonic(track, axis, order, amplitude, errors);
@@ -29,8 +29,8 @@ Effect MakeStageRipple() {
           .paragraph =
               "A carrier inside the planetary gearhead is off centre: a ripple with the order "
               "of its stage (11.3, 48.6 or 208 a turn with a pinion stage behind it).",
-          .list = List,
-          .apply = Apply};
+          .list = ListStageRipple,
+          .apply = ApplyStageRipple};
 }
 
 }  // namespace focalfleet::sim

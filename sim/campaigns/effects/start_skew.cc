@@ -7,14 +7,14 @@ namespace focalfleet::sim {
 namespace {
 
 // Forms of the templates.
-enum Form {
+enum SkewForm {
   kStraight,       // the missing way grows with the slot, from a share of the slots on
   kStraightEarly,  // the same, in exposures that do not wait for the end of a move
   kBraking,        // a unit that is cut off while braking misses little: its speed falls to nothing
   kRace,           // the missing way grows with the time by which the start comes after the delay
 };
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListStartSkew(const CampaignFacts& facts, Templates* out) {
   const std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi, EffectAxis::kBoth};
   const std::vector<double> shapes = {0, 0.25, 0.5, 0.75};
   ListGrid({.axes = axes,
@@ -48,7 +48,7 @@ void List(const CampaignFacts& facts, Templates* out) {
 
 // Slots are shares from 0 to 1. A skew that begins below 0 is a play for all units, and two of them
 // cancel.
-bool Shows(const Template& form, const CampaignFacts& facts) {
+bool ShowsStartSkew(const Template& form, const CampaignFacts& facts) {
   if (form.form == kRace) return form.shape > std::max(facts.Find("delay_s")->low, 0.0);
   if (form.form == kBraking) return form.shape > 0 && form.shape <= 1;
   return form.shape >= 0 && form.shape < 1;
@@ -62,8 +62,8 @@ double MissingOfBraking(double late, double braking) {
   return missing / (1 - braking / 2);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyStartSkew(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                    PoseErrors* errors) {
   constexpr double kEarly_s = 1;
   const std::span<const double> slot = track.Column("bus_slot");
   const double last = std::max(track.facts->Find("bus_slot")->high, 1.0);
@@ -100,10 +100,10 @@ Effect MakeStartSkew() {
               "Units that the bus starts late are not yet there when the exposure begins, or "
               "their move is cut: the error is against the motion and grows with the place in "
               "the start order. Wait for the last one.",
-          .list = List,
-          .apply = Apply,
+          .list = ListStartSkew,
+          .apply = ApplyStartSkew,
           .continuous_shape = true,
-          .shows = Shows,
+          .shows = ShowsStartSkew,
           // Without places in the order a late start is play.
           .passes_for = {"backlash"}};
 }

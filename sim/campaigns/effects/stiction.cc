@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kStays = 0.15;  // share of the wind-up at which the arm breaks loose
 
-void List(const CampaignFacts&, Templates* out) {
+void ListStiction(const CampaignFacts&, Templates* out) {
   constexpr double kThresholds_deg[] = {0.05, 0.07, 0.1,  0.14, 0.2, 0.28, 0.4,
                                         0.57, 0.8,  1.13, 1.6,  2.3, 3.2};
   ListGrid({.memories = {Memory::kNow, Memory::kHold, Memory::kChain},
@@ -28,8 +28,8 @@ void List(const CampaignFacts&, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyStiction(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                   PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   double behind_deg = 0;
@@ -57,8 +57,8 @@ Effect MakeStiction() {
           .paragraph =
               "Moves shorter than a threshold are swallowed by static friction: the arm stays "
               "where it was. Avoid short corrections, or overshoot and come back.",
-          .list = List,
-          .apply = Apply,
+          .list = ListStiction,
+          .apply = ApplyStiction,
           .continuous_shape = true,
           .amplitude_low = 0,
           .amplitude_high = 1.2,

@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListSupplyDrift(const CampaignFacts& facts, Templates* out) {
   const FilledColumn* volts = facts.Find("v_bus_V");
   const std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi, EffectAxis::kBoth};
   ListGrid({.axes = axes, .shapes = {volts->high, volts->mean}, .shape_name = "below, V,"}, out);
@@ -20,8 +20,8 @@ void List(const CampaignFacts& facts, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplySupplyDrift(const UnitTrack& track, const Template& form,
+                      std::span<const double> amplitude, PoseErrors* errors) {
   const std::span<const double> volts = track.Column("v_bus_V");
   const double usual_V = track.facts->Find("v_bus_V")->mean;
   std::span<const double> drive;
@@ -53,8 +53,8 @@ Effect MakeSupplyDrift() {
           .paragraph =
               "The supply (a battery, a warm regulator) sinks while the campaign runs, and "
               "the lag of all units grows with it. Log and regulate the voltage.",
-          .list = List,
-          .apply = Apply,
+          .list = ListSupplyDrift,
+          .apply = ApplySupplyDrift,
           // Over a night the air cools as the supply sinks.
           .passes_for = {"thermal_backlash"}};
 }

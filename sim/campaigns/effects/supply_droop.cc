@@ -29,7 +29,7 @@ constexpr int kUndriven = kLoaded + static_cast<int>(std::size(kFeeds) * std::si
 constexpr int kToPullOut = kUndriven + static_cast<int>(std::size(kFeeds));
 constexpr double kDepthToPullOut = 2.5;
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListSupplyDroop(const CampaignFacts& facts, Templates* out) {
   // Form 0 is the whole rail alike. The others go by the place along the harness, which has the
   // movers evenly along it in form 3.
   const std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi, EffectAxis::kBoth};
@@ -105,8 +105,8 @@ Way WayOf(int form) {
           .depth = kDepths[k % std::size(kDepths)].value};
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplySupplyDroop(const UnitTrack& track, const Template& form,
+                      std::span<const double> amplitude, PoseErrors* errors) {
   const Way way = WayOf(form.form);
   const std::vector<double> droop =
       way.feed_share < 0 ? ByPlace(track, form.form) : ByCurrent(track, way.feed_share);
@@ -140,8 +140,8 @@ Effect MakeSupplyDroop() {
               "The more units move on one rail, and the farther along the harness a unit "
               "sits, the lower its voltage and the larger its lag. Move fewer at once, or "
               "feed the rail at both ends.",
-          .list = List,
-          .apply = Apply,
+          .list = ListSupplyDroop,
+          .apply = ApplySupplyDroop,
           .continuous_shape = true,
           // Without counts of the movers a sag is play.
           .passes_for = {"backlash"}};

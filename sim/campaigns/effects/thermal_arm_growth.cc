@@ -5,7 +5,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListThermalArmGrowth(const CampaignFacts& facts, Templates* out) {
   const std::vector<EffectAxis> arms = {EffectAxis::kBoth, EffectAxis::kTheta, EffectAxis::kPhi};
   ListGrid({.axes = arms}, out);
   if (facts.Has("t_s"))
@@ -16,8 +16,8 @@ void List(const CampaignFacts& facts, Templates* out) {
              out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyThermalArmGrowth(const UnitTrack& track, const Template& form,
+                           std::span<const double> amplitude, PoseErrors* errors) {
   const std::span<const double> temperature = track.Column("temp_C");
   const double usual_C = track.facts->Find("temp_C")->mean;
   std::vector<double> late;
@@ -41,8 +41,8 @@ Effect MakeThermalArmGrowth() {
           .paragraph =
               "Both arms grow with temperature (aluminium: 23 parts in a million a kelvin). "
               "The error is along the arms and follows the unit's temperature.",
-          .list = List,
-          .apply = Apply,
+          .list = ListThermalArmGrowth,
+          .apply = ApplyThermalArmGrowth,
           .continuous_shape = true,
           // Without temperatures arms that grow over a night are warmed by their motors.
           .passes_for = {"self_heating"}};

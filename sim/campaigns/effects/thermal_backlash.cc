@@ -20,7 +20,7 @@ double Warmer(int form, double temperature_C, double from_C) {
   return (1 - stiffer) * from_K * from_K / b_K;
 }
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListThermalBacklash(const CampaignFacts& facts, Templates* out) {
   const FilledColumn* temperature = facts.Find("temp_C");
   const std::vector<double> from = {20, temperature->mean, temperature->first};
   ListGrid({.shapes = from, .shape_name = "from, C,"}, out);
@@ -28,8 +28,8 @@ void List(const CampaignFacts& facts, Templates* out) {
     ListGrid({.shapes = from, .shape_name = "as grease stiffens, from, C,", .form = form}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyThermalBacklash(const UnitTrack& track, const Template& form,
+                          std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   const std::span<const double> temperature = track.Column("temp_C");
@@ -54,8 +54,8 @@ Effect MakeThermalBacklash() {
               "The clearance of the gears or the viscosity of their grease depends on "
               "temperature, so that the error after a reversal does. Approach from one side, "
               "or compensate by the measured temperature.",
-          .list = List,
-          .apply = Apply,
+          .list = ListThermalBacklash,
+          .apply = ApplyThermalBacklash,
           // Over a night the supply sinks as the air cools.
           .passes_for = {"supply_drift"}};
 }

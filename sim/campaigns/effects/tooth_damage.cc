@@ -14,7 +14,7 @@ namespace {
 constexpr bool IsOfPinion(int form) { return form % 2 == 0; }
 constexpr bool IsWide(int form) { return form >= 2; }
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListToothDamage(const CampaignFacts& facts, Templates* out) {
   for (const int form : {0, 1, 2, 3}) {
     if (IsOfPinion(form) && !HasPinion(facts)) continue;
     const int places = IsWide(form) ? 12 : 24;
@@ -28,14 +28,14 @@ void List(const CampaignFacts& facts, Templates* out) {
 }
 
 // A bump whose top the axis never reaches is the end of a range rather than a tooth.
-bool Shows(const Template& form, const CampaignFacts& facts) {
+bool ShowsToothDamage(const Template& form, const CampaignFacts& facts) {
   if (IsOfPinion(form.form)) return true;
   const FilledColumn& angle = facts.columns.at(std::string(kCommand[AxisIndex(form)]));
   return form.shape + 360 * std::ceil((angle.low - form.shape) / 360) <= angle.high;
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyToothDamage(const UnitTrack& track, const Template& form,
+                      std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const double order = IsOfPinion(form.form) ? PinionRatio(*track.unit, axis) : 1.0;
   const double width_deg = IsWide(form.form) ? 20 : 12;  // of the damaged gear, standard deviation
@@ -61,11 +61,11 @@ Effect MakeToothDamage() {
           .paragraph =
               "One tooth is worn or chipped: the angle errs by a bump whenever the gear "
               "passes that tooth, at the same place each turn of it and in both directions.",
-          .list = List,
-          .apply = Apply,
+          .list = ListToothDamage,
+          .apply = ApplyToothDamage,
           .continuous_shape = true,
           .own_shape = true,
-          .shows = Shows};
+          .shows = ShowsToothDamage};
 }
 
 }  // namespace focalfleet::sim

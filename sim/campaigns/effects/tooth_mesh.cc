@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListToothMesh(const CampaignFacts& facts, Templates* out) {
   std::vector<double> meshes = {kRingTeeth};
   if (HasPinion(facts)) meshes.insert(meshes.begin(), kOutputTeeth);
   // Form 0 has all teeth alike. In form 1 the ripple is deeper on one side of the gear, as its axis
@@ -17,8 +17,8 @@ void List(const CampaignFacts& facts, Templates* out) {
            out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyToothMesh(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                    PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const double once = form.shape == kRingTeeth ? PinionRatio(*track.unit, axis) : 1;
   const double order = form.shape * once;
@@ -41,8 +41,8 @@ Effect MakeToothMesh() {
               "The teeth themselves: a ripple with one period a tooth of the output gear "
               "(order 45), or of the last ring (46 teeth, order 122 with a pinion stage), alike "
               "all around or deeper on one side.",
-          .list = List,
-          .apply = Apply};
+          .list = ListToothMesh,
+          .apply = ApplyToothMesh};
 }
 
 }  // namespace focalfleet::sim

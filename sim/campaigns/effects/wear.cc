@@ -28,7 +28,7 @@ double SpanOf(const CampaignFacts& facts) {
   return std::pow(10, std::round(std::log10(most)));
 }
 
-void List(const CampaignFacts& facts, Templates* out) {
+void ListWear(const CampaignFacts& facts, Templates* out) {
   std::vector<EffectAxis> axes;
   if (facts.Has(kColumns[kTheta])) axes.push_back(EffectAxis::kTheta);
   if (facts.Has(kColumns[kPhi])) axes.push_back(EffectAxis::kPhi);
@@ -39,8 +39,8 @@ void List(const CampaignFacts& facts, Templates* out) {
     ListGrid({.axes = axes, .shapes = span, .shape_name = kNames[form], .form = form}, out);
 }
 
-void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-           PoseErrors* errors) {
+void ApplyWear(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+               PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> cycles = track.Column(kColumns[axis]);
   const double span = form.shape > 0 ? form.shape : kTurns;
@@ -69,8 +69,8 @@ Effect MakeWear() {
               "The unit changes with the turns it has made, slowly and without return: its "
               "zero creeps, its clearance opens, or its scale drifts. Re-calibrate by turns, "
               "not by the calendar.",
-          .list = List,
-          .apply = Apply,
+          .list = ListWear,
+          .apply = ApplyWear,
           .one_is_enough = true,
           .amplitude_low = -20,  // a gear that falls apart
           .amplitude_high = 20};

@@ -1,5 +1,6 @@
 // Rules of every command: exit codes of wrong usage, help, JSON, and completion for the whole tree.
 #include "daemon/cli/command_line.h"
+#include "daemon/study/study.h"
 
 #include <gmock/gmock.h>
 
@@ -19,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::IsSupersetOf;
 
-std::vector<CompletionNode> Nodes() { return cli::WalkCommands(cli::MakeCommandLine()->app); }
+std::vector<CompletionNode> Nodes() { return cli::WalkCommands(cli::MakeCommandLine(cli::AddStudyCommands)->app); }
 
 std::vector<std::string> Words(const std::string& path) {
   return path.empty() ? std::vector<std::string>{} : CLI::detail::split(path, ' ');
@@ -118,7 +119,7 @@ TEST(CommandLine, HelpShowsTheHelpOfACommand) {
 }
 
 TEST(CommandLine, EveryCommandIsInAGroupOfItsOwnAndHelpIsWithoutTheParsersWords) {
-  const auto line = cli::MakeCommandLine();
+  const auto line = cli::MakeCommandLine(cli::AddStudyCommands);
   std::vector<std::string> tools;
   for (const CLI::App* command : line->app.get_subcommands({})) {
     if (command->get_group() == "Tools") tools.push_back(command->get_name());

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "daemon/cli/command_line.h"
+#include "daemon/study/study.h"
 #include "daemon/cli/completion.h"
 #include "tests/daemon/cli/program.h"
 #include "tests/support/scratch_folder.h"
@@ -89,7 +90,7 @@ std::string LineOf(const CompletionNode& node) {
 class CompletionShells : public ::testing::TestWithParam<const Shell*> {};
 
 TEST_P(CompletionShells, OfferEverySubcommandAndOptionOfTheTree) {
-  const auto nodes = cli::WalkCommands(cli::MakeCommandLine()->app);
+  const auto nodes = cli::WalkCommands(cli::MakeCommandLine(cli::AddStudyCommands)->app);
   std::vector<std::string> lines;
   for (const CompletionNode& node : nodes) {
     lines.push_back(LineOf(node));

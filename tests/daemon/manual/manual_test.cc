@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "daemon/cli/command_line.h"
+#include "daemon/study/study.h"
 #include "daemon/cli/completion.h"
 #include "daemon/process/config_manual.h"
 #include "daemon/simulator/command_line.h"
@@ -67,7 +68,7 @@ TEST_F(ManualPages, AreShownWithoutAWarning) {
 }
 
 TEST_F(ManualPages, HaveEveryCommandAndOptionOfTheCommandLine) {
-  const auto nodes = cli::WalkCommands(cli::MakeCommandLine()->app);
+  const auto nodes = cli::WalkCommands(cli::MakeCommandLine(cli::AddStudyCommands)->app);
   const std::string program = Page("focalfleet.1");
   std::set<std::string> of_all;
   for (const auto& option : nodes.front().options) {
@@ -93,7 +94,7 @@ TEST_F(ManualPages, HaveEveryCommandAndOptionOfTheCommandLine) {
 }
 
 TEST_F(ManualPages, HaveAnExampleOfEveryCommand) {
-  for (const auto& node : cli::WalkCommands(cli::MakeCommandLine()->app)) {
+  for (const auto& node : cli::WalkCommands(cli::MakeCommandLine(cli::AddStudyCommands)->app)) {
     if (!node.commands.empty()) continue;
     const std::string page = Page("focalfleet-" + node.path.substr(0, node.path.find(' ')) + ".1");
     const std::string lines = "focalfleet " + node.path;

@@ -1,12 +1,12 @@
-#include "daemon/cli/compare_models_command.h"
+#include "daemon/study/compare_models_command.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <vector>
 
-#include "daemon/cli/measured_campaign.h"
 #include "daemon/cli/table.h"
+#include "daemon/study/measured_campaign.h"
 #include "sim/campaigns/diagnosis/compare_models.h"
 
 namespace focalfleet::cli {

@@ -3,7 +3,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
-#include "daemon/cli/tune.h"
+#include "daemon/study/tune.h"
 
 namespace focalfleet::cli {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "daemon/cli/claims_report.h"
-#include "daemon/cli/hall_options.h"
+#include "daemon/study/claims_report.h"
+#include "daemon/study/hall_options.h"
 #include "sim/hall/reproduction/hall_reproduce.h"
 
 namespace focalfleet::cli {

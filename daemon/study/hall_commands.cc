@@ -8,9 +8,9 @@
 #include <map>
 
 #include "daemon/campaign/sha256.h"
-#include "daemon/cli/hall_options.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
+#include "daemon/study/hall_options.h"
 
 namespace focalfleet::cli {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "daemon/cli/hall_options.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
+#include "daemon/study/hall_options.h"
 #include "sim/hall/diagnosis/calibration.h"
 
 namespace focalfleet::cli {

@@ -5,9 +5,9 @@
 
 #include <memory>
 
-#include "daemon/cli/command_line.h"
 #include "daemon/cli/drive_options.h"
-#include "daemon/cli/tune.h"
+#include "daemon/study/study.h"
+#include "daemon/study/tune.h"
 
 namespace focalfleet::cli {
 

@@ -1,4 +1,4 @@
-#include "daemon/cli/drive_report.h"
+#include "daemon/study/drive_report.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "daemon/cli/measured_campaign.h"
+#include "daemon/study/measured_campaign.h"
 
 #include <fmt/format.h>
 

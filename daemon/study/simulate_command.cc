@@ -7,11 +7,11 @@
 #include <filesystem>
 #include <numbers>
 
-#include "daemon/cli/command_line.h"
 #include "daemon/cli/drive_options.h"
-#include "daemon/cli/drive_report.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
+#include "daemon/study/drive_report.h"
+#include "daemon/study/study.h"
 #include "fleet/files/csv.h"
 #include "sim/drive/scope/recording.h"
 #include "sim/drive/start_study.h"

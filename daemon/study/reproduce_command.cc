@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "daemon/cli/claims_report.h"
-#include "daemon/cli/command_line.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/report/page.h"
+#include "daemon/study/claims_report.h"
+#include "daemon/study/study.h"
 #include "sim/drive/reproduction/reproduce.h"
 
 namespace focalfleet::cli {

@@ -6,10 +6,10 @@
 #include <filesystem>
 
 #include "daemon/campaign/sha256.h"
-#include "daemon/cli/hall_options.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
 #include "daemon/hall/hall_report.h"
+#include "daemon/study/hall_options.h"
 
 namespace focalfleet::cli {
 namespace {

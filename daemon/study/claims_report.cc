@@ -1,4 +1,4 @@
-#include "daemon/cli/claims_report.h"
+#include "daemon/study/claims_report.h"
 
 #include <fmt/format.h>
 
