@@ -13,8 +13,8 @@ constexpr std::size_t kSeenMax = 1000;  // exposures; a night has a few hundred
 }  // namespace
 
 ExposureDone CameraWorker::Do(const CameraWork& work, const std::atomic<bool>& ending) {
-  const auto now = [] {
-    return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch());
+  const auto now = []() -> std::chrono::nanoseconds {
+    return std::chrono::steady_clock::now().time_since_epoch();
   };
   auto done = Begin(work, now());
   while (!done && !ending) {

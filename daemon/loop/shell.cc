@@ -105,17 +105,18 @@ void Shell::Step() {
   store_.committed_through = parts_.store->committed_through();
   const std::vector<RefusedRow> refused = parts_.store->TakeRefused();
   effects_.Clear();
-  parts_.coordinator->Step({.now = now_,
-                            .frames = frames_,
-                            .links = links_,
-                            .commands = commands_,
-                            .plans = plans_,
-                            .exposures = exposures_,
-                            .notes = notes_,
-                            .committed_through = store_.committed_through,
-                            .store_failing = store_.failing,
-                            .refused = refused},
-                           &effects_);
+  const Inputs inputs{.now = now_,
+                      .frames = frames_,
+                      .links = links_,
+                      .commands = commands_,
+                      .plans = plans_,
+                      .exposures = exposures_,
+                      .notes = notes_,
+                      .committed_through = store_.committed_through,
+                      .store_failing = store_.failing,
+                      .refused = refused};
+  parts_.coordinator->Step(inputs, &effects_);
+  parts_.stepped(inputs, effects_);
   ++steps_;
 }
 

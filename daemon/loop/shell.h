@@ -76,6 +76,9 @@ class Shell {
     /// Looks, without waiting, which lines and requests are ready.
     std::function<void()> look = [] {};
     std::function<void(TurnPoint)> passed = [](TurnPoint) {};
+    /// Receives each step, before anything of it is done.
+    std::function<void(const Inputs&, const Effects&)> stepped = [](const Inputs&,
+                                                                    const Effects&) {};
   };
 
   explicit Shell(Parts parts);

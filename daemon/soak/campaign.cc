@@ -125,7 +125,7 @@ Result<Summary> RunCampaign(const CampaignOptions& options) {
     if (options.minutes && minutes() >= *options.minutes) break;
     const Draws draws = DrawSeed(seed, {.units = options.units});
     options.print(Describe(draws));
-    NightOptions night;
+    NightOptions night{.replay = options.replay};
     if (options.tell) night.tell = options.print;
     NightResult result = Night(draws, night).Run();
     if (options.twice) {

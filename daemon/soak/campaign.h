@@ -53,6 +53,7 @@ struct CampaignOptions {
   std::optional<std::uint32_t> units;
   std::string json_folder;  // empty: none is written
   bool twice = false;       // each seed must be the same run again
+  bool replay = false;      // each step must be decided again as it was
   bool tell = false;        // a line for each change of state
   std::function<void(const std::string&)> print;
 };

@@ -108,6 +108,7 @@ void Judge::Commits(std::span<const Row> rows) {
 
 void Judge::Committed(std::span<const Row> rows, bool done) {
   if (!done) return;  // a later attempt, or a kill, decides
+  NoteBlind(rows);
   Apply(rows, &shadow_);
   in_flight_.reset();
   for (const Row& row : rows)
@@ -116,6 +117,25 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
       places.push_back(shadow_.places[vector->serial.value]);
       if (places.size() > kToldMax) places.pop_front();
     }
+}
+
+/// The row of an intent stands before the row by which the store forgets the place.
+void Judge::NoteBlind(std::span<const Row> rows) {
+  std::map<std::uint32_t, StoredPlace> places;
+  for (const Row& row : rows) {
+    if (const auto* vector = std::get_if<VectorRow>(&row)) {
+      StoredPicture one;
+      Apply(std::span(&row, 1), &one);
+      places[vector->serial.value] = one.places[vector->serial.value];
+    }
+    const auto* intent = std::get_if<IntentRow>(&row);
+    if (intent == nullptr) continue;
+    const std::uint32_t serial = intent->serial.value;
+    if (!places.contains(serial) && shadow_.places.contains(serial))
+      places[serial] = shadow_.places[serial];
+    const bool exact = places.contains(serial) && IsExact(places[serial]);
+    if (!exact) blind_.insert({intent->unit.value, intent->move.value});
+  }
 }
 
 void Judge::LifeBegins() {
@@ -165,10 +185,7 @@ void Judge::Sends(BusId, const CanFrame& frame) {
   if (function != kStart && function != kHome) return;
   const StoredPicture* durable = Durable();
   if (durable == nullptr) return;
-  for (const auto& [serial, intent] : durable->intents) {
-    const auto place = durable->places.find(serial);
-    allowed_[{intent.unit, intent.move}] = place != durable->places.end() && IsExact(place->second);
-  }
+  for (const auto& [serial, intent] : durable->intents) allowed_.insert({intent.unit, intent.move});
 }
 
 void Judge::Published(const StatusBatch& status) {
@@ -235,7 +252,7 @@ void Judge::LookAtStarts(std::size_t row, const sim::UnitTruth& truth) {
   if (allowed == allowed_.end())
     Broken("start", fmt::format("unit {} began move {} without a durable intent", truth.id.value,
                                 truth.last_move.value));
-  else if (truth.state == UnitState::kMoving && !allowed->second)
+  else if (truth.state == UnitState::kMoving && blind_.contains(*allowed))
     Broken("start", fmt::format("unit {} began move {} from a place that is not known",
                                 truth.id.value, truth.last_move.value));
 }

@@ -75,6 +75,7 @@ class Judge {
   void LookAtPlace(std::size_t row, const sim::UnitTruth& truth);
   void LookAtStop(std::size_t row, const sim::UnitTruth& truth);
   void LookForContact(std::span<const sim::UnitTruth> truths);
+  void NoteBlind(std::span<const Row> rows);
   [[nodiscard]] std::size_t BusOf(std::size_t row) const;
 
   const Plant* plant_;
@@ -87,8 +88,9 @@ class Judge {
   StoredPicture shadow_;                   // acknowledged
   std::optional<StoredPicture> in_flight_; // with the batch that is being committed
   std::map<std::uint32_t, std::deque<StoredPlace>> told_;  // acknowledged places, newest last
-  /// Moves that a durable intent allows, by unit and move; the value: the place was exact.
-  std::map<std::pair<std::uint32_t, std::uint32_t>, bool> allowed_;
+  using Move = std::pair<std::uint32_t, std::uint32_t>;  // unit, move
+  std::set<Move> allowed_;                               // by a durable intent
+  std::set<Move> blind_;  // whose intent was acknowledged while the unit's place was not exact
   std::vector<Seen> seen_;
   std::vector<std::vector<std::size_t>> near_;
   std::set<std::pair<std::size_t, std::size_t>> touching_;

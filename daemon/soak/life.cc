@@ -62,6 +62,7 @@ Status Life::Open() {
       StatusScheduler::Options{.rate_hz = 5, .version = "soak", .started = clock_.Wall()}, clock_);
   CoordinatorConfig config;
   config.has_camera = around_.camera != nullptr;
+  around_.starts(stored, config);
   coordinator_ = std::make_unique<Coordinator>(&layout, around_.plant->drives(), config,
                                                std::move(stored));
   writer_ = std::make_unique<StoreWriter>(MakeSinks());
@@ -136,7 +137,8 @@ void Life::MakeShell() {
                                                 .reader = reader_.get(),
                                                 .scheduler = scheduler_.get(),
                                                 .clock = clock_,
-                                                .passed = around_.passed});
+                                                .passed = around_.passed,
+                                                .stepped = around_.stepped});
 }
 
 HostInstant Life::wake_at() {

@@ -42,6 +42,9 @@ struct Surroundings {
   std::function<void(std::span<const Row>, bool done)> committed;
   std::function<void(const StatusBatch&)> published;
   std::function<void(const std::string&)> log;
+  /// The coordinator of this life starts from this state.
+  std::function<void(const StoredFleet&, const CoordinatorConfig&)> starts;
+  std::function<void(const Inputs&, const Effects&)> stepped;
   /// None: there is no camera.
   std::function<std::unique_ptr<CameraQueue>()> camera;
   std::function<HostInstant()> camera_due = [] { return kNever; };

@@ -95,6 +95,17 @@ Surroundings Night::Around() {
   around.commits = [this](std::span<const Row> rows) { judge_->Commits(rows); };
   around.committed = [this](std::span<const Row> rows, bool done) { Committed(rows, done); };
   around.published = [this](const StatusBatch& status) { judge_->Published(status); };
+  around.starts = [this](const StoredFleet& stored, const CoordinatorConfig& config) {
+    replayer_.reset();
+    if (options_.replay)
+      replayer_ = std::make_unique<journal::Replayer>(journal::Replayer::Start{
+          &plant_->layout(), plant_->drives(), config, stored});
+  };
+  around.stepped = [this](const Inputs& inputs, const Effects& effects) {
+    if (replayer_ == nullptr) return;
+    const Status same = replayer_->Step(journal::RecordOf(inputs, effects));
+    if (!same) judge_->Broken("replay", same.error().text);
+  };
   around.log = [this](const std::string& text) {
     if (options_.log)
       options_.log(fmt::format("{:.6f} {}", 1e-9 * static_cast<double>(now_.ns), text));

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/journal/step_record.h"
 #include "daemon/soak/draws.h"
 #include "daemon/soak/fault_injector.h"
 #include "daemon/soak/judge.h"
@@ -38,6 +39,8 @@ struct NightResult {
 struct NightOptions {
   /// One line for each change of state; none: nothing is told.
   std::function<void(const std::string&)> tell;
+  /// Each step of each life is taken again by another coordinator, which must decide the same.
+  bool replay = false;
   /// The log of the daemon; none: it is not kept.
   std::function<void(const std::string&)> log;
 };
@@ -89,6 +92,7 @@ class Night {
   bool in_start_ = false;
   std::optional<FaultSite> dying_;  // within SQLite, which cannot be left by an exception
   std::string state_;       // as last told
+  std::unique_ptr<journal::Replayer> replayer_;  // of this life; none: it is not replayed
   std::uint64_t digest_ = 0xcbf29ce484222325u;
 };
 

@@ -71,6 +71,8 @@ CLI::App* AddSoak(CLI::App* app, SoakOptions* options) {
                    "range that never ran")
       ->type_name("DIR");
   soak->add_flag("--twice", options->twice, "Run each seed again: it must be the same run");
+  soak->add_flag("--replay", options->replay,
+                 "Take each step again from its record: it must be decided the same");
   soak->add_flag("--tell", options->tell, "A line for each change of state");
   return soak;
 }
@@ -89,6 +91,7 @@ int RunSoak(const SoakOptions& options) {
                            .units = {},
                            .json_folder = options.json_folder,
                            .twice = options.twice,
+                           .replay = options.replay,
                            .tell = options.tell};
   if (options.minutes > 0) campaign.minutes = options.minutes;
   if (options.units > 0) campaign.units = options.units;

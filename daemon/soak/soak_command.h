@@ -16,6 +16,7 @@ struct SoakOptions {
   double minutes = 0;
   std::uint32_t units = 0;
   bool twice = false;
+  bool replay = false;
   bool tell = false;
 };
 
