@@ -13,33 +13,49 @@ constexpr std::size_t kSeenMax = 1000;  // exposures; a night has a few hundred
 }  // namespace
 
 ExposureDone CameraWorker::Do(const CameraWork& work, const std::atomic<bool>& ending) {
-  const std::uint64_t id = work.job.id;
-  // All units are at rest by now, so each exposure from here on shows them at rest.
-  const WallTime since = options_.now();
-  if (const Status asked = port_->Request(id, since); !asked)
-    return {id, tl::unexpected(asked.error())};
-  Error trouble{ErrorCode::kUnavailable, "nothing came from the camera within " +
-                                             std::to_string(options_.patience.count()) + " ms"};
-  const auto give_up = std::chrono::steady_clock::now() + options_.patience;
-  while (!ending) {
+  const auto now = []() -> std::chrono::nanoseconds {
+    return std::chrono::steady_clock::now().time_since_epoch();
+  };
+  auto done = Begin(work, now());
+  while (!done && !ending) {
     options_.alive();
+    done = Look(work, now());
+    if (!done) std::this_thread::sleep_for(options_.pause);
+  }
+  if (done) return std::move(*done);
+  return {work.job.id, Fail(ErrorCode::kUnavailable, "the daemon ends")};
+}
+
+std::optional<ExposureDone> CameraWorker::Begin(const CameraWork& work,
+                                                std::chrono::nanoseconds now) {
+  // All units are at rest by now, so each exposure from here on shows them at rest.
+  since_ = options_.now();
+  give_up_ = now + options_.patience;
+  trouble_ = {ErrorCode::kUnavailable, "nothing came from the camera within " +
+                                           std::to_string(options_.patience.count()) + " ms"};
+  const Status asked = port_->Request(work.job.id, since_);
+  if (asked) return std::nullopt;
+  return ExposureDone{work.job.id, tl::unexpected(asked.error())};
+}
+
+std::optional<ExposureDone> CameraWorker::Look(const CameraWork& work,
+                                               std::chrono::nanoseconds now) {
+  for (;;) {
     auto taken = port_->Take();
-    if (taken && *taken) {
-      auto findings = Judge(work, **taken, since);
-      if (findings) return {id, std::move(findings)};
-      trouble = findings.error();
-      options_.log("exposure " + (*taken)->id + " is not used: " + trouble.text);
-      if (std::chrono::steady_clock::now() >= give_up) return {id, tl::unexpected(trouble)};
-      continue;
+    const bool came = taken && *taken;
+    if (came) {
+      auto findings = Judge(work, **taken, since_);
+      if (findings) return ExposureDone{work.job.id, std::move(findings)};
+      trouble_ = findings.error();
+      options_.log("exposure " + (*taken)->id + " is not used: " + trouble_.text);
     }
     if (!taken) {
-      trouble = {taken.error().code, FirstRow(taken.error().text)};
-      options_.log("not an exposure: " + trouble.text);
+      trouble_ = {taken.error().code, FirstRow(taken.error().text)};
+      options_.log("not an exposure: " + trouble_.text);
     }
-    if (std::chrono::steady_clock::now() >= give_up) return {id, tl::unexpected(trouble)};
-    std::this_thread::sleep_for(options_.pause);
+    if (now >= give_up_) return ExposureDone{work.job.id, tl::unexpected(trouble_)};
+    if (!came) return std::nullopt;
   }
-  return {id, Fail(ErrorCode::kUnavailable, "the daemon ends")};
 }
 
 Result<ExposureFindings> CameraWorker::Judge(const CameraWork& work, const Exposure& exposure,

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,10 +40,17 @@ class CameraWorker {
   CameraWorker(std::unique_ptr<CameraPort> port, Options options)
       : port_(std::move(port)), options_(std::move(options)) {}
 
-  /// The answer to one job.
+  /// The answer to one job: Begin, and Look after each pause.
   /// Errors in the answer: kRefused: an exposure came and was not believed; kUnavailable: nothing
   /// came, or `ending` is set.
   ExposureDone Do(const CameraWork& work, const std::atomic<bool>& ending);
+
+  /// The exposure is asked for; an answer: it cannot be. `now` is read from a clock that never
+  /// steps.
+  std::optional<ExposureDone> Begin(const CameraWork& work, std::chrono::nanoseconds now);
+  /// Judges what has arrived. None: the wait goes on. Pre: Begin gave no answer, nor did an earlier
+  /// Look; `work` is the same.
+  std::optional<ExposureDone> Look(const CameraWork& work, std::chrono::nanoseconds now);
 
  private:
   Result<ExposureFindings> Judge(const CameraWork& work, const Exposure& exposure, WallTime since);
@@ -50,6 +58,10 @@ class CameraWorker {
   std::unique_ptr<CameraPort> port_;
   Options options_;
   std::vector<SeenExposure> seen_;
+  // Of the job under way.
+  WallTime since_;
+  std::chrono::nanoseconds give_up_{0};
+  Error trouble_;
 };
 
 }  // namespace focalfleet

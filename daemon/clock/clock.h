@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <ctime>
 
+#include "daemon/clock/wall_time.h"
 #include "protocol/base/instants.h"
 
 namespace focalfleet {
@@ -20,9 +21,11 @@ inline std::int64_t ReadMonotonicNs() { return ReadClockNs(CLOCK_MONOTONIC); }
 
 class HostClock {
  public:
-  /// `read` gives CLOCK_MONOTONIC in ns; a test passes a clock of its own.
-  explicit HostClock(double speed = 1, std::int64_t (*read)() = ReadMonotonicNs)
-      : speed_(speed), read_(read) {}
+  /// `read` gives CLOCK_MONOTONIC in ns, and `wall` the time of day; tests and simulations pass
+  /// clocks of their own.
+  explicit HostClock(double speed = 1, std::int64_t (*read)() = ReadMonotonicNs,
+                     WallTime (*wall)() = &WallTime::Now)
+      : speed_(speed), read_(read), wall_(wall) {}
 
   [[nodiscard]] HostInstant Now() const { return FromMonotonic(read_()); }
   /// The reading of CLOCK_MONOTONIC, in ns, at which host time reaches `at`, rounded up.
@@ -39,10 +42,12 @@ class HostClock {
     return {static_cast<std::int64_t>(static_cast<double>(duration.ns) * speed_)};
   }
   [[nodiscard]] double speed() const { return speed_; }
+  [[nodiscard]] WallTime Wall() const { return wall_(); }
 
  private:
   double speed_;
   std::int64_t (*read_)();
+  WallTime (*wall_)();
 };
 
 }  // namespace focalfleet

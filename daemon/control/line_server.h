@@ -23,26 +23,14 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/control/line_exchange.h"
 #include "daemon/control/messages.h"
 #include "protocol/base/limits.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet {
 
-/// A server never gives an id twice, so an answer cannot reach another client than the one that
-/// asked.
-using ClientId = std::uint64_t;
-
-struct IncomingLine {
-  ClientId client = 0;
-  std::string text;        // without its newline
-  bool overtaken = false;  // an urgent line that came later was handed out before it
-  bool reserved = false;   // its client has a reserved place: only urgent lines are to be handled
-  /// The user of the client's process when it connected; none: not known.
-  std::optional<std::uint32_t> user = {};
-};
-
-class LineServer {
+class LineServer final : public LineExchange {
  public:
   struct Options {
     std::size_t line_bytes_max = kControlLineBytesMax;
@@ -73,22 +61,22 @@ class LineServer {
   LineServer(LineServer&&) noexcept;
   LineServer& operator=(LineServer&&) noexcept;
   /// Removes the socket file, if it still is the one of this server.
-  ~LineServer();
+  ~LineServer() override;
 
   /// Readable whenever Service has something to do.
-  [[nodiscard]] int fd() const;
+  [[nodiscard]] int fd() const override;
 
   /// Accepts, reads and writes as much as goes without waiting. Urgent lines are appended, at most
   /// one of each client.
-  void Service(std::vector<IncomingLine>* urgent);
+  void Service(std::vector<IncomingLine>* urgent) override;
   /// The next line; clients take turns. None: no line waits, or its client does not read answers.
-  std::optional<IncomingLine> Next();
+  std::optional<IncomingLine> Next() override;
 
   /// Queues the last answer to a line of this client. False: the client is gone (that is no fault).
-  bool Answer(ClientId client, std::string_view line);
+  bool Answer(ClientId client, std::string_view line) override;
   /// Queues a line before the last answer; skipped where the client does not read. False: the
   /// client is gone.
-  bool Progress(ClientId client, std::string_view line);
+  bool Progress(ClientId client, std::string_view line) override;
 
   [[nodiscard]] bool connected(ClientId client) const;
   [[nodiscard]] std::size_t clients() const;

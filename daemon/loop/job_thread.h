@@ -11,13 +11,14 @@
 #include <utility>
 
 #include "daemon/loop/event_signal.h"
+#include "daemon/loop/job_queue.h"
 #include "daemon/loop/spsc_queue.h"
 #include "daemon/loop/thread_name.h"
 
 namespace focalfleet {
 
 template <class Job, class Answer>
-class JobThread {
+class JobThread final : public JobQueue<Job, Answer> {
  public:
   /// `ending` turns true when the answer of the running job is no longer wanted.
   using Work = std::function<Answer(const Job&, const std::atomic<bool>& ending)>;
@@ -38,10 +39,8 @@ class JobThread {
   static Result<std::unique_ptr<JobThread>> Create(Work work, const EventSignal* done) {
     return Create(std::move(work), done, Options{});
   }
-  JobThread(const JobThread&) = delete;
-  JobThread& operator=(const JobThread&) = delete;
   /// Waits for the running job.
-  ~JobThread() {
+  ~JobThread() override {
     ending_ = true;
     wake_.Raise();
     thread_.join();
@@ -49,12 +48,12 @@ class JobThread {
 
   /// The job is taken over. False: too many jobs wait (the coordinator has one at a time), and
   /// `job` is untouched.
-  [[nodiscard]] bool Submit(Job* job) {
+  [[nodiscard]] bool Submit(Job* job) override {
     if (answers_.size() + jobs_.size() >= kJobs || !jobs_.Push(job)) return false;
     wake_.Raise();
     return true;
   }
-  std::optional<Answer> Take() { return answers_.Pop(); }
+  std::optional<Answer> Take() override { return answers_.Pop(); }
   /// A thread that sleeps takes a turn.
   void Wake() const { wake_.Raise(); }
 

@@ -1,29 +1,10 @@
 #include "daemon/loop/store_thread.h"
 
-#include <algorithm>
-#include <iterator>
 #include <utility>
 
 #include "daemon/loop/thread_name.h"
-#include "fleet/row_check.h"
 
 namespace focalfleet {
-namespace {
-
-constexpr std::size_t kBatches = 1024;
-constexpr std::size_t kStatuses = 4;
-constexpr std::size_t kRowsPerTransaction = 65'536;
-/// At the end the publisher may be behind, and nothing else wakes the thread. The wait is a tenth
-/// of what a slow cycle of DDS takes.
-constexpr std::chrono::milliseconds kOfferAgain{20};
-/// In half a second even a slow cycle is over. Twice as many would take the time in which the
-/// daemon must have ended.
-constexpr int kOffersAtEnd = 25;
-/// Alarms of the thread itself are numbered apart from the stored ones: the store fails, so these
-/// alarms are not stored.
-constexpr std::uint64_t kOwnAlarms = std::uint64_t{1} << 63;
-
-}  // namespace
 
 Result<std::unique_ptr<StoreThread>> StoreThread::Create(Sinks sinks,
                                                          const EventSignal* progressed) {
@@ -33,195 +14,39 @@ Result<std::unique_ptr<StoreThread>> StoreThread::Create(Sinks sinks,
 }
 
 StoreThread::StoreThread(Sinks sinks, const EventSignal* progressed, EventSignal wake)
-    : sinks_(std::move(sinks)),
-      progressed_(progressed),
-      wake_(std::move(wake)),
-      batches_(kBatches),
-      statuses_(kStatuses),
+    : wake_(std::move(wake)),
+      writer_(Hooked(std::move(sinks), progressed)),
       thread_([this] { Run(); }) {}
+
+StoreWriter::Sinks StoreThread::Hooked(Sinks sinks, const EventSignal* progressed) {
+  sinks.progressed = [progressed] { progressed->Raise(); };
+  sinks.offered = [this] { wake_.Raise(); };
+  return sinks;
+}
 
 StoreThread::~StoreThread() {
   if (thread_.joinable()) static_cast<void>(Finish());
 }
 
-// ---- called by the core thread
-
-void StoreThread::Commit(std::uint64_t batch, std::vector<Row> rows) {
-  held_.push_back({batch, batch, std::move(rows), WallTime::Now()});
-  HandOver();
-}
-
-void StoreThread::HandOver() {
-  bool any = false;
-  while (!held_.empty() && batches_.Push(&held_.front())) {
-    held_.pop_front();
-    any = true;
-  }
-  if (any) wake_.Raise();
-}
-
-bool StoreThread::Publish(StatusBatch* status) {
-  if (!statuses_.Push(status)) return false;
-  wake_.Raise();
-  return true;
-}
-
-std::vector<RefusedRow> StoreThread::TakeRefused() {
-  const std::lock_guard lock(lock_);
-  return std::exchange(refused_, {});
-}
-
-std::optional<Error> StoreThread::failure() const {
-  const std::lock_guard lock(lock_);
-  return failing_ ? std::optional(last_error_) : std::nullopt;
-}
-
 Status StoreThread::Finish() {
   ending_ = true;
-  while (!held_.empty() && !failing_) {
-    HandOver();
+  while (writer_.held() > 0 && !writer_.failing()) {
+    writer_.HandOver();
     std::this_thread::yield();
   }
   wake_.Raise();
   thread_.join();
-  if (!failing_ && held_.empty()) return {};
-  return tl::unexpected<Error>(last_error_);
+  const auto failure = writer_.failure();
+  if (!failure && writer_.held() == 0) return {};
+  return tl::unexpected<Error>(failure.value_or(Error{}));
 }
-
-// ---- called on the store's thread
 
 void StoreThread::Run() {
   NameThisThread("store");
   for (;;) {
-    sinks_.alive();
-    const bool ending = ending_;  // read before the queues: earlier batches are seen below
-    Gather();
-    const bool committed = TryCommit();
-    PublishReady();
-    if (committed && batches_.size() > 0) continue;
-    // At the end a broken disk gets one more attempt only.
-    if (ending && (Idle() || failing_)) return;
-    if (committed && !ending && KeepUp()) continue;
-    if (attempted_)
-      wake_.Wait(std::clamp(std::chrono::ceil<std::chrono::milliseconds>(
-                                retry_at_ - std::chrono::steady_clock::now()),
-                            std::chrono::milliseconds(1), sinks_.retry_period));
-    else
-      wake_.Wait(ending ? std::optional(kOfferAgain) : std::nullopt);
-  }
-}
-
-bool StoreThread::Idle() const {
-  return open_.rows.empty() && batches_.size() == 0 && statuses_.size() == 0 && !status_;
-}
-
-/// Adds waiting batches to the open one, unless that has failed already: then it must stay the
-/// same.
-void StoreThread::Gather() {
-  while (!attempted_ && open_.rows.size() < kRowsPerTransaction) {
-    auto next = batches_.Pop();
-    if (!next) return;
-    if (open_.rows.empty()) {
-      open_ = std::move(*next);
-      continue;
-    }
-    open_.number = next->number;
-    open_.rows.insert(open_.rows.end(), std::make_move_iterator(next->rows.begin()),
-                      std::make_move_iterator(next->rows.end()));
-  }
-}
-
-bool StoreThread::TryCommit() {
-  if (open_.rows.empty()) return true;
-  if (attempted_ && !ending_ && std::chrono::steady_clock::now() < retry_at_) return false;
-  for (std::size_t k = open_.rows.size(); k-- > 0;)
-    if (const char* const flaw = Flaw(open_.rows[k])) SetAside(k, flaw);
-  while (!open_.rows.empty()) {
-    std::size_t refused = open_.rows.size();
-    const Status done = sinks_.commit(open_.rows, open_.at, &refused);
-    if (done) break;
-    const bool for_ever = done.error().code == ErrorCode::kInvalid && refused < open_.rows.size();
-    if (!for_ever) {
-      NoteFailure(done.error());
-      return false;
-    }
-    SetAside(refused, done.error().text);
-  }
-  for (const Row& row : open_.rows)
-    if (const auto* alarm = std::get_if<AlarmRow>(&row)) sinks_.alarm({open_.at, *alarm});
-  open_.rows.clear();
-  attempted_ = false;
-  committed_through_ = open_.number;
-  if (failing_.exchange(false) && sinks_.log_info)
-    sinks_.log_info("the store can be written again");
-  progressed_->Raise();
-  return true;
-}
-
-/// The rest of the batch goes on without the row, which is in refused_ before committed_through_
-/// reaches its batch.
-void StoreThread::SetAside(std::size_t row, const std::string& why) {
-  const auto at = open_.rows.begin() + static_cast<std::ptrdiff_t>(row);
-  sinks_.log_error("the store refuses the " + Describe(*at) + ": " + why + "; it is set aside");
-  {
-    const std::lock_guard lock(lock_);
-    refused_.push_back({open_.first, open_.number, std::move(*at), why});
-  }
-  open_.rows.erase(at);
-}
-
-void StoreThread::NoteFailure(const Error& error) {
-  {
-    const std::lock_guard lock(lock_);
-    last_error_ = error;
-  }
-  attempted_ = true;
-  retry_at_ = std::chrono::steady_clock::now() + sinks_.retry_period;
-  if (failing_.exchange(true)) return;
-  const std::string text = "the store cannot be written, nothing new is started: " + error.text;
-  sinks_.log_error(text);
-  // The number contains the time, so that a restarted daemon does not reuse it.
-  const WallTime now = WallTime::Now();
-  const std::uint64_t id = kOwnAlarms + static_cast<std::uint64_t>(now.ns) / 1000 + own_alarms_++;
-  const bool full = error.code == ErrorCode::kFull;
-  sinks_.alarm({now,
-                {.id = id,
-                 .severity = Severity::kError,
-                 .unit = {},
-                 .bus = {},
-                 .text = text,
-                 .name = full ? AlarmName::kStoreFull : AlarmName::kStoreFailing}});
-  progressed_->Raise();
-}
-
-/// True: more is due at once.
-bool StoreThread::KeepUp() {
-  const auto now = std::chrono::steady_clock::now();
-  if (now < upkeep_at_) return false;
-  const bool more = sinks_.upkeep();
-  upkeep_at_ = more ? now : now + sinks_.upkeep_period;
-  return more;
-}
-
-void StoreThread::PublishReady() {
-  for (;;) {
-    if (!status_) status_ = statuses_.Pop();
-    if (!status_) return;
-    if (committed_through_ < status_->after_batch) {
-      // The fleet's own status says that the store fails; it alone may go ahead of the commit.
-      if (failing_ && status_->fleet) {
-        StatusBatch ahead;
-        ahead.fleet = std::move(status_->fleet);
-        ahead.fleet->store_failing = true;
-        status_->fleet.reset();
-        static_cast<void>(sinks_.publish(&ahead));  // the next one says the same
-      }
-      return;
-    }
-    if (!sinks_.publish(&*status_)) {
-      if (!ending_ || ++offered_at_end_ < kOffersAtEnd) return;  // else DDS hangs
-    }
-    status_.reset();
+    const StoreWriter::Rest rest = writer_.Turn(ending_);
+    if (rest.ended) return;
+    if (rest.wait != std::chrono::milliseconds(0)) wake_.Wait(rest.wait);
   }
 }
 

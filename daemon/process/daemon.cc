@@ -336,24 +336,24 @@ Status Daemon::StartThreads() {
             signal_.get(), {.name = "camera", .alive = Answering(&service_.camera)}));
   }
   OpenService();
-  FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.layout = layout_.get(),
-                                                  .coordinator = coordinator_.get(),
-                                                  .lines = lines_.get(),
-                                                  .handler = handler_.get(),
-                                                  .models = models_.get(),
-                                                  .alarms = &alarms_,
-                                                  .planner = planner_.get(),
-                                                  .camera = measuring_.thread.get(),
-                                                  .store = stored_.writer.get(),
-                                                  .reader = stored_.reader.get(),
-                                                  .scheduler = status_.scheduler.get(),
-                                                  .metrics = metrics_.sampler.get(),
-                                                  .sync = sync_.get(),
-                                                  .troubles = status_.troubles.get(),
+  FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.shell = {.layout = layout_.get(),
+                                                            .coordinator = coordinator_.get(),
+                                                            .lines = lines_.get(),
+                                                            .handler = handler_.get(),
+                                                            .models = models_.get(),
+                                                            .alarms = &alarms_,
+                                                            .planner = planner_.get(),
+                                                            .camera = measuring_.thread.get(),
+                                                            .store = &stored_.writer->writer(),
+                                                            .reader = stored_.reader.get(),
+                                                            .scheduler = status_.scheduler.get(),
+                                                            .metrics = metrics_.sampler.get(),
+                                                            .sync = sync_.get(),
+                                                            .troubles = status_.troubles.get(),
+                                                            .service = service_.report.get(),
+                                                            .clock = clock_},
                                                   .threads = signal_.get(),
-                                                  .service = service_.report.get(),
-                                                  .hang_up = &ReopenLog,
-                                                  .clock = clock_}));
+                                                  .hang_up = &ReopenLog}));
   ServeMetrics();
   return {};
 }

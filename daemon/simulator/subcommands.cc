@@ -251,6 +251,8 @@ std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
   CLI::App* quit =
       AddSubcommand(app, given, "quit", "End the simulation, which writes its FLASH file");
   list.push_back({quit, [given] { return AskSimply(*given, {0, "quit", Json::object()}); }});
+  list.push_back(
+      {soak::AddSoak(app, &given->soak), [given] { return soak::RunSoak(given->soak); }});
   return list;
 }
 

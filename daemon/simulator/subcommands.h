@@ -11,6 +11,7 @@
 
 #include "daemon/cli/exit_code.h"
 #include "daemon/simulator/simulator.h"
+#include "daemon/soak/soak_command.h"
 
 namespace focalfleet::simulator {
 
@@ -42,6 +43,7 @@ struct Given {
   double seconds = -1;
   double after_s = -1;
   Misbehaviour misbehaviour;
+  soak::SoakOptions soak;
   bool off = false;
   bool json = false;
 };

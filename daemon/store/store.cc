@@ -65,11 +65,13 @@ Store::~Store() = default;
 
 Result<std::unique_ptr<Store>> Store::Open(const std::string& path, const StoreOptions& options) {
   auto store = std::unique_ptr<Store>(new Store);
-  store->path_ = Canonical(path);
-  // The lock comes first, because opening and closing the file would drop locks that this process
-  // may have on it.
-  FOCALFLEET_TRY_ASSIGN(store->lock_, LockFile::Acquire(store->path_ + ".lock"));
-  FOCALFLEET_TRY(InspectHeader(store->path_, static_cast<std::int32_t>(Migrations().size())));
+  store->path_ = options.vfs_has_files ? path : Canonical(path);
+  if (!options.vfs_has_files) {
+    // The lock comes first, because opening and closing the file would drop locks that this process
+    // may have on it.
+    FOCALFLEET_TRY_ASSIGN(store->lock_, LockFile::Acquire(store->path_ + ".lock"));
+    FOCALFLEET_TRY(InspectHeader(store->path_, static_cast<std::int32_t>(Migrations().size())));
+  }
   FOCALFLEET_TRY_ASSIGN(store->connection_,
                         Connection::Open(store->path_, Connection::Mode::kWrite, options.vfs,
                                          static_cast<int>(options.busy_wait.count())));

@@ -147,7 +147,7 @@ StoreReader::~StoreReader() = default;
 Result<std::unique_ptr<StoreReader>> StoreReader::Open(const std::string& path,
                                                        const StoreOptions& options) {
   struct stat status {};
-  if (stat(path.c_str(), &status) != 0) {
+  if (!options.vfs_has_files && stat(path.c_str(), &status) != 0) {
     return Fail(ErrorCode::kUnavailable, "store " + path + ": " + std::strerror(errno));
   }
   auto reader = std::unique_ptr<StoreReader>(new StoreReader);

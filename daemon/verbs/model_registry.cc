@@ -66,7 +66,7 @@ ModelRow ModelRegistry::Append(ModelRow row) {
   row.entry = changes_.empty() ? 1 : changes_.back().row.entry + 1;
   ModelRow kept = row;
   kept.text.reset();
-  changes_.push_back({std::move(kept), WallTime::Now()});
+  changes_.push_back({std::move(kept), now_()});
   return row;
 }
 

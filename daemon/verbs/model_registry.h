@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/campaign/compensation.h"
@@ -24,8 +25,9 @@ class ModelRegistry {
   /// Limit of the changes that are taken from the store and shown.
   static constexpr std::uint32_t kChangesMax = 1000;
 
-  /// `layout` outlives the registry.
-  explicit ModelRegistry(const Layout* layout) : layout_(layout) {}
+  /// `layout` outlives the registry. `now` gives the time of day.
+  explicit ModelRegistry(const Layout* layout, std::function<WallTime()> now = &WallTime::Now)
+      : layout_(layout), now_(std::move(now)) {}
 
   /// All changes of the store are known; no model is in force yet. Pre: no change was made: later
   /// ones are numbered after those of the store.
@@ -74,6 +76,7 @@ class ModelRegistry {
   [[nodiscard]] std::size_t Origin(std::size_t index) const;
 
   const Layout* layout_;
+  std::function<WallTime()> now_;
   std::optional<ModelFile> file_;
   std::optional<Compensation> compensation_;
   std::vector<ModelHistory> changes_;  // oldest first

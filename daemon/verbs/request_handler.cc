@@ -33,11 +33,11 @@ Result<Json> AskUnit(const FleetView& view, const ControlRequest& request) {
 }
 
 /// Open alarms are known here, also where the store cannot be read.
-std::optional<Result<Json>> AskOpenAlarms(const ControlRequest& request,
+std::optional<Result<Json>> AskOpenAlarms(const FleetView& view, const ControlRequest& request,
                                           const AlarmRegister& alarms) {
   const auto all = FlagArgumentOr(request.args, "all", false);
   if (all && *all) return std::nullopt;  // AskStore
-  const auto reading = AskAlarms(request, alarms, WallTime::Now());
+  const auto reading = AskAlarms(request, alarms, view.at);
   if (!reading) return Result<Json>(tl::unexpected<Error>(reading.error()));
   return (*reading)(nullptr);
 }
@@ -48,7 +48,7 @@ std::optional<Result<StoreReading>> AskStore(const FleetView& view, const Contro
   if (request.verb == "params") return AskParameters(request, view);
   if (request.verb == "history") return AskHistory(request, view);
   if (request.verb == "events") return AskEvents(request, view);
-  if (request.verb == "alarms") return AskAlarms(request, alarms, WallTime::Now());
+  if (request.verb == "alarms") return AskAlarms(request, alarms, view.at);
   if (request.verb == "measurements") return AskMeasurements(request, view);
   return std::nullopt;
 }
@@ -66,14 +66,14 @@ bool HasMoved(const ConfigurationView& configuration) {
 
 void RequestHandler::Service(const FleetView& view, std::vector<Command>* commands) {
   stops_.clear();
-  server_.Service(&stops_);
+  server_->Service(&stops_);
   for (const IncomingLine& line : stops_) Handle(view, line, commands);
   // A flood of stops must not keep other clients out, so every second turn is for all.
   stopped_ = !stops_.empty() && !stopped_;
   if (stopped_) return;
   spent_bytes_ = 0;
   while (spent_bytes_ < kTurnBytes) {
-    const auto line = server_.Next();
+    const auto line = server_->Next();
     if (!line) return;
     spent_bytes_ += kLineBytes + line->text.size();
     Handle(view, *line, commands);
@@ -125,7 +125,7 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
   pending.wait = *wait && pending.is_configuration;
   auto change = ChangeModel(view, *request);
-  if (!change) change = ChangeAlarms(*request, options_.alarms, UserOf(line), WallTime::Now());
+  if (!change) change = ChangeAlarms(*request, options_.alarms, UserOf(line), view.at);
   auto command = change ? std::move(*change) : CommandOf(*request, view);
   if (!command) {
     options_.log(request->verb + " refused: " + FirstRow(command.error().text));
@@ -143,7 +143,7 @@ std::optional<Result<Json>> RequestHandler::Ask(const FleetView& view,
                                                 const ControlRequest& request) {
   if (request.verb == "status") return Result<Json>(StatusJson(view, options_.facts()));
   if (request.verb == "unit") return AskUnit(view, request);
-  if (request.verb == "alarms") return AskOpenAlarms(request, *options_.alarms);
+  if (request.verb == "alarms") return AskOpenAlarms(view, request, *options_.alarms);
   if (request.verb == "select") return AskSelection(request, view);
   if (request.verb == "model")
     return Result<Json>(options_.models->Show(ModelRegistry::kChangesMax));
@@ -225,7 +225,7 @@ std::string RequestHandler::NoteOn(const FleetView& view, const Command& command
 
 Result<StoreReader*> RequestHandler::Reader() {
   if (reader_ == nullptr) {
-    FOCALFLEET_TRY_ASSIGN(reader_, StoreReader::Open(options_.store_path));
+    FOCALFLEET_TRY_ASSIGN(reader_, StoreReader::Open(options_.store_path, options_.store));
   }
   return reader_.get();
 }
@@ -237,7 +237,7 @@ void RequestHandler::Answer(const Pending& pending, const Result<Json>& result) 
 
 void RequestHandler::Send(ClientId client, const std::string& answer) {
   spent_bytes_ += answer.size();
-  server_.Answer(client, answer);
+  server_->Answer(client, answer);
 }
 
 void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
@@ -344,13 +344,13 @@ void RequestHandler::ShowProgress(const FleetView& view) {
         {"dry_run", true},
         {"targeted", dry_run_->targeted},
         {"elapsed_s", static_cast<double>((view.now - dry_run_->since).ns) / second}};
-    server_.Progress(dry_run_->pending.client, EncodeProgress(dry_run_->pending.id, planning));
+    server_->Progress(dry_run_->pending.client, EncodeProgress(dry_run_->pending.id, planning));
   }
   if (waiting_ == 0) return;
   const Json progress = ProgressJson(view);
   for (const auto& [request, pending] : pending_)
     if (pending.gets_progress())
-      server_.Progress(pending.client, EncodeProgress(pending.id, progress));
+      server_->Progress(pending.client, EncodeProgress(pending.id, progress));
 }
 
 void RequestHandler::Close() {

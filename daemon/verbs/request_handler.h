@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -42,11 +43,14 @@ class RequestHandler {
     std::function<ShellFacts()> facts;
     std::function<void(const std::string&)> log;  // one sentence for each command
     std::string store_path;
+    StoreOptions store = {};
     ModelRegistry* models = nullptr;  // outlives the handler
     AlarmRegister* alarms = nullptr;  // likewise
   };
-  RequestHandler(LineServer server, Options options)
+  RequestHandler(std::unique_ptr<LineExchange> server, Options options)
       : server_(std::move(server)), options_(std::move(options)) {}
+  RequestHandler(LineServer server, Options options)
+      : RequestHandler(std::make_unique<LineServer>(std::move(server)), std::move(options)) {}
 
   /// Bytes of lines and answers of one turn; the line that exceeds them is the turn's last. A byte
   /// costs 10 to 30 ns, so the budget is about a millisecond. With half of it most answers to
@@ -60,7 +64,7 @@ class RequestHandler {
   /// write so (over 512 bytes, or escapes in the word) is not urgent; it is handled in its turn.
   static bool IsStop(std::string_view line);
 
-  [[nodiscard]] int fd() const { return server_.fd(); }
+  [[nodiscard]] int fd() const { return server_->fd(); }
 
   /// A turn: requests are read, questions answered, commands appended.
   void Service(const FleetView& view, std::vector<Command>* commands);
@@ -124,7 +128,7 @@ class RequestHandler {
   void Answer(const Pending& pending, const Result<Json>& result);
   void Send(ClientId client, const std::string& answer);
 
-  LineServer server_;
+  std::unique_ptr<LineExchange> server_;
   Options options_;
   std::unique_ptr<StoreReader> reader_;  // of changes of the model; opened with the first
   std::deque<StoreQuestion> questions_;  // not handed over yet

@@ -9,7 +9,7 @@ StoreAnswer StoreQuestions::operator()(const StoreQuestion& question,
                                        const std::atomic<bool>& ending) {
   const auto read = [&]() -> Result<Json> {
     if (reader_ == nullptr) {
-      FOCALFLEET_TRY_ASSIGN(reader_, StoreReader::Open(path_));
+      FOCALFLEET_TRY_ASSIGN(reader_, StoreReader::Open(path_, options_));
       reader_->EndWith(&ending);
     }
     return question.read(reader_.get());

@@ -30,12 +30,14 @@ struct StoreAnswer {
 /// The work of the reader's thread. The store is opened with the first question.
 class StoreQuestions {
  public:
-  explicit StoreQuestions(std::string path) : path_(std::move(path)) {}
+  explicit StoreQuestions(std::string path, const StoreOptions& options = {})
+      : path_(std::move(path)), options_(options) {}
   /// Once `ending` is true the answer comes soon and says so. Pre: `ending` is the same each time.
   StoreAnswer operator()(const StoreQuestion& question, const std::atomic<bool>& ending);
 
  private:
   std::string path_;
+  StoreOptions options_;
   std::shared_ptr<StoreReader> reader_;
 };
 

@@ -42,6 +42,9 @@ void Disturbances::Babble(UnitId unit, const std::optional<CanFrame>& frame) {
 void Disturbances::RaiseFault(UnitId unit, FaultCode code, Axis axis) {
   core_->RaiseFault(core_->Row(unit), {code, axis});
 }
+void Disturbances::SpoilFlash(UnitId unit, FlashDamage damage) {
+  core_->unit(core_->Row(unit)).SpoilFlash(damage);
+}
 UnitFaults* Disturbances::faults(UnitId unit) {
   const auto row = core_->Find(unit);
   return row ? &core_->unit(*row).faults() : nullptr;

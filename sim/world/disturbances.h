@@ -33,6 +33,7 @@ class Disturbances {
   /// The unit's controller sends this frame whenever arbitration lets it; none: no more.
   void Babble(UnitId unit, const std::optional<CanFrame>& frame);
   void RaiseFault(UnitId unit, FaultCode code, Axis axis = Axis::kTheta);
+  void SpoilFlash(UnitId unit, FlashDamage damage);
   /// Null where there is no such unit.
   [[nodiscard]] UnitFaults* faults(UnitId unit);
   [[nodiscard]] BusFaults* faults(BusId bus);

@@ -52,6 +52,12 @@ struct UnitFaults {
   bool claims_arrival = false;
 };
 
+/// Damage of a unit's FLASH, done at once.
+enum class FlashDamage : std::uint8_t {
+  kOldCounts,  // both axes have counts of earlier
+  kNoMark,     // the mark of a move under way is clear
+};
+
 /// The misbehaviour of one bus: chances per frame, except for noise.
 struct BusFaults {
   double bit_error_rate = 0;  // all nodes see a bit inverted: the frame is destroyed and repeated

@@ -43,6 +43,13 @@ void Unit::OnSync(HostInstant now, TransmitQueue* out) {
   RecordBegun(now);
 }
 
+void Unit::SpoilFlash(FlashDamage damage) {
+  constexpr std::int32_t kEarlierVectors = 1000;
+  if (damage == FlashDamage::kNoMark) flash_.moving = false;
+  if (damage == FlashDamage::kOldCounts)
+    for (AxisFlash& axis : flash_.axis) axis.set_position(axis.position() - kEarlierVectors);
+}
+
 void Unit::RecordBegun(HostInstant now) {
   if (recorded_ == flash_.moves_begun) return;
   recorded_ = flash_.moves_begun;

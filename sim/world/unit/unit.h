@@ -29,6 +29,8 @@ class Unit {
   void OnTime(HostInstant now, TransmitQueue* out);
   void OnSync(HostInstant now, TransmitQueue* out);
 
+  void SpoilFlash(FlashDamage damage);
+
   [[nodiscard]] Firmware& firmware() { return firmware_; }
   [[nodiscard]] const Firmware& firmware() const { return firmware_; }
   [[nodiscard]] const Flash& flash() const { return flash_; }

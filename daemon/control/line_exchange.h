@@ -1,0 +1,48 @@
+// LineExchange is what the request handler needs of a server of lines: lines come in, answers go
+// out, and nothing waits. LineServer does so over a socket; a simulation over queues.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace focalfleet {
+
+/// A server never gives an id twice, so an answer cannot reach another client than the one that
+/// asked.
+using ClientId = std::uint64_t;
+
+struct IncomingLine {
+  ClientId client = 0;
+  std::string text;        // without its newline
+  bool overtaken = false;  // an urgent line that came later was handed out before it
+  bool reserved = false;   // its client has a reserved place: only urgent lines are to be handled
+  /// The user of the client's process when it connected; none: not known.
+  std::optional<std::uint32_t> user = {};
+};
+
+class LineExchange {
+ public:
+  virtual ~LineExchange() = default;
+
+  /// Readable whenever Service has something to do; -1: there is no descriptor.
+  [[nodiscard]] virtual int fd() const = 0;
+  /// Accepts, reads and writes as much as goes without waiting. Urgent lines are appended.
+  virtual void Service(std::vector<IncomingLine>* urgent) = 0;
+  virtual std::optional<IncomingLine> Next() = 0;
+  /// Queues the last answer to a line of this client. False: the client is gone.
+  virtual bool Answer(ClientId client, std::string_view line) = 0;
+  /// Queues a line before the last answer. False: the client is gone.
+  virtual bool Progress(ClientId client, std::string_view line) = 0;
+
+ protected:
+  LineExchange() = default;
+  LineExchange(const LineExchange&) = default;
+  LineExchange(LineExchange&&) = default;
+  LineExchange& operator=(const LineExchange&) = default;
+  LineExchange& operator=(LineExchange&&) = default;
+};
+
+}  // namespace focalfleet

@@ -1,0 +1,49 @@
+// A record of one step of the coordinator: all that it took in, and a digest of what it decided. A
+// coordinator that starts from the same state and takes the recorded inputs must decide the same, to
+// the bit. Plans are not recorded: the planner makes the same one of the same job.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fleet/coordinator.h"
+
+namespace focalfleet::journal {
+
+/// The digest of all that a step decided.
+std::uint64_t DigestOf(const Effects& effects);
+
+/// The bytes of a record.
+std::string RecordOf(const Inputs& inputs, const Effects& effects);
+
+/// Replays records, in their order, on a coordinator of its own.
+class Replayer {
+ public:
+  struct Start {
+    const Layout* layout = nullptr;  // outlives the replayer
+    std::vector<UnitDrive> drives;
+    CoordinatorConfig config;
+    StoredFleet stored;
+  };
+  explicit Replayer(Start start);
+  ~Replayer();
+
+  /// The step decided as it did when it was recorded. Errors: kInvalid: the bytes are no record;
+  /// kRefused: it decided otherwise, with its number, its instant and what differs.
+  Status Step(std::string_view record);
+  [[nodiscard]] std::uint64_t steps() const { return steps_; }
+
+ private:
+  const Layout* layout_;
+  std::unique_ptr<Coordinator> coordinator_;
+  std::map<std::uint64_t, PlanJob> jobs_;  // that have no answer yet
+  Effects effects_;
+  std::uint64_t steps_ = 0;
+};
+
+}  // namespace focalfleet::journal

@@ -1,0 +1,77 @@
+// The injector lets faults of the armed sites happen: those that go by time by itself, those that go
+// by occasions when it is asked. It counts each site that was reached, and notes what a fault
+// touches and until when.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <queue>
+#include <vector>
+
+#include "daemon/soak/draws.h"
+#include "daemon/soak/fault_sites.h"
+#include "daemon/soak/memory_disk.h"
+#include "daemon/soak/plant.h"
+#include "daemon/soak/troubles.h"
+#include "protocol/base/rng.h"
+
+namespace focalfleet::soak {
+
+class FaultInjector {
+ public:
+  struct Parts {
+    const Draws* draws = nullptr;
+    Plant* plant = nullptr;
+    MemoryDisk* disk = nullptr;
+    Troubles* troubles = nullptr;
+    FaultCounts* reached = nullptr;
+    /// What the host has to do itself at a fault of it.
+    std::function<void(FaultSite)> host;
+  };
+  FaultInjector(const Parts& parts, HostInstant now);
+
+  /// The next fault that goes by time, or the next end of one.
+  [[nodiscard]] HostInstant next() const;
+  /// Does what is due. Pre: the plant has advanced to `now`.
+  void Apply(HostInstant now);
+  /// Whether a fault that goes by occasions happens now; it is counted then. `more` times likelier
+  /// where it is most dangerous.
+  bool Happens(FaultSite site, double more = 1);
+  /// No fault begins any more, and all that lasts has ended.
+  void Heal(HostInstant now);
+
+  /// An operation of the disk, for MemoryDisk::fails.
+  int Disk(DiskOperation operation);
+  [[nodiscard]] bool is_on(FaultSite site) const { return on_[Index(site)]; }
+  Rng* rng() { return &rng_; }
+
+ private:
+  struct End {
+    HostInstant at;
+    std::uint64_t number = 0;  // in order of their begins
+    std::function<void()> undo;
+    bool operator>(const End& other) const {
+      return std::pair(at, number) > std::pair(other.at, other.number);
+    }
+  };
+  void Begin(FaultSite site);
+  bool BeginOnBus(FaultSite site);
+  bool BeginOnUnit(FaultSite site);
+  void BeginWrongAnswers(FaultSite site, UnitId unit);
+  void Until(HostInstant at, std::function<void()> undo);
+  void Count(FaultSite site) { ++(*parts_.reached)[Index(site)]; }
+  [[nodiscard]] HostInstant Lasts();
+  DurationNs Gap(FaultSite site);
+  void Hear(bool garbage);
+
+  Parts parts_;
+  HostInstant now_;
+  Rng rng_;
+  bool healed_ = false;
+  std::array<HostInstant, kFaultSites> due_{};
+  std::array<bool, kFaultSites> on_{};  // of faults that last
+  std::priority_queue<End, std::vector<End>, std::greater<>> ends_;
+  std::uint64_t ends_number_ = 0;
+};
+
+}  // namespace focalfleet::soak

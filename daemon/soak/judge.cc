@@ -1,0 +1,344 @@
+#include "daemon/soak/judge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <variant>
+
+#include "protocol/base/limits.h"
+
+namespace focalfleet::soak {
+namespace {
+
+using Point = std::complex<double>;
+
+constexpr std::size_t kBrokenMax = 20;
+/// A rotor lags behind its field by less than this at rest. Units: vectors.
+constexpr double kLagVectors = 24;
+/// After a power cut a rotor settles where its field is applied anew, within half a turn of it.
+constexpr double kJumpVectors = 60;
+constexpr DurationNs kStopWithin = Milliseconds(150);
+/// A fault that kept a stop from a unit may lead to contact so long after it.
+constexpr DurationNs kContactAfter = Seconds(60);
+constexpr std::size_t kToldMax = 64;
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+double Cross(Point a, Point b) { return a.real() * b.imag() - a.imag() * b.real(); }
+double Dot(Point a, Point b) { return a.real() * b.real() + a.imag() * b.imag(); }
+
+double FromSegment(Point p, Point a, Point b) {
+  const double length = std::norm(b - a);
+  const double t = length > 0 ? std::clamp(Dot(p - a, b - a) / length, 0.0, 1.0) : 0.0;
+  return std::abs(p - a - t * (b - a));
+}
+
+/// The distance of two segments: 0 where they cross, else that of an end.
+double BetweenSegments(Point a, Point b, Point c, Point d) {
+  const double side_c = Cross(b - a, c - a), side_d = Cross(b - a, d - a);
+  const double side_a = Cross(d - c, a - c), side_b = Cross(d - c, b - c);
+  if (side_c * side_d < 0 && side_a * side_b < 0) return 0;
+  return std::min({FromSegment(a, c, d), FromSegment(b, c, d), FromSegment(c, a, b),
+                   FromSegment(d, a, b)});
+}
+
+bool Moves(const sim::UnitTruth& truth) {
+  return truth.powered &&
+         (truth.state == UnitState::kMoving || truth.state == UnitState::kHoming);
+}
+
+}  // namespace
+
+Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles)
+    : plant_(plant), disk_(disk), troubles_(troubles), seen_(plant->layout().size()) {
+  const auto units = plant->layout().units();
+  near_.resize(units.size());
+  for (std::size_t i = 0; i < units.size(); ++i)
+    for (std::size_t j = i + 1; j < units.size(); ++j) {
+      const double apart = std::hypot(units[i].base_fp.x_mm - units[j].base_fp.x_mm,
+                                      units[i].base_fp.y_mm - units[j].base_fp.y_mm);
+      if (apart < units[i].reach_mm() + units[j].reach_mm()) near_[i].push_back(j);
+    }
+}
+
+void Judge::Broken(const std::string& rule, const std::string& what) {
+  if (broken_.size() < kBrokenMax)
+    broken_.push_back(
+        fmt::format("{:.3f} s: {}: {}", 1e-9 * static_cast<double>(now_.ns), rule, what));
+}
+
+std::size_t Judge::BusOf(std::size_t row) const {
+  const auto buses = plant_->layout().buses();
+  const auto at = std::lower_bound(buses.begin(), buses.end(), plant_->layout().units()[row].bus);
+  return static_cast<std::size_t>(at - buses.begin());
+}
+
+void Judge::Apply(std::span<const Row> rows, StoredPicture* picture) {
+  // Ends of intents are written last.
+  for (const Row& row : rows) {
+    if (const auto* vector = std::get_if<VectorRow>(&row)) {
+      StoredPlace& place = picture->places[vector->serial.value];
+      for (std::size_t axis = 0; axis < place.size(); ++axis)
+        place[axis] = {static_cast<int>(vector->knowledge[axis].witness),
+                       vector->knowledge[axis].low, vector->knowledge[axis].high};
+    } else if (const auto* intent = std::get_if<IntentRow>(&row)) {
+      picture->intents[intent->serial.value] = {intent->unit.value,
+                                                intent->move.value,
+                                                {intent->hull[0].low, intent->hull[1].low},
+                                                {intent->hull[0].high, intent->hull[1].high}};
+    } else if (const auto* binding = std::get_if<BindingRow>(&row)) {
+      picture->units[binding->unit.value].serial = binding->serial.value;
+    } else if (const auto* enable = std::get_if<EnableRow>(&row)) {
+      picture->units[enable->unit.value].enabled = enable->enabled;
+    }
+  }
+  for (const Row& row : rows)
+    if (const auto* end = std::get_if<IntentEndRow>(&row)) {
+      const auto open = picture->intents.find(end->serial.value);
+      if (open != picture->intents.end() && open->second.move == end->move.value)
+        picture->intents.erase(open);
+    }
+}
+
+void Judge::Commits(std::span<const Row> rows) {
+  in_flight_ = shadow_;
+  Apply(rows, &*in_flight_);
+}
+
+void Judge::Committed(std::span<const Row> rows, bool done) {
+  if (!done) return;  // a later attempt, or a kill, decides
+  NoteBlind(rows);
+  Apply(rows, &shadow_);
+  in_flight_.reset();
+  for (const Row& row : rows)
+    if (const auto* vector = std::get_if<VectorRow>(&row)) {
+      auto& places = told_[vector->serial.value];
+      places.push_back(shadow_.places[vector->serial.value]);
+      if (places.size() > kToldMax) places.pop_front();
+    }
+}
+
+/// The row of an intent stands before the row by which the store forgets the place.
+void Judge::NoteBlind(std::span<const Row> rows) {
+  std::map<std::uint32_t, StoredPlace> places;
+  for (const Row& row : rows) {
+    if (const auto* vector = std::get_if<VectorRow>(&row)) {
+      StoredPicture one;
+      Apply(std::span(&row, 1), &one);
+      places[vector->serial.value] = one.places[vector->serial.value];
+    }
+    const auto* intent = std::get_if<IntentRow>(&row);
+    if (intent == nullptr) continue;
+    const std::uint32_t serial = intent->serial.value;
+    if (!places.contains(serial) && shadow_.places.contains(serial))
+      places[serial] = shadow_.places[serial];
+    const bool exact = places.contains(serial) && IsExact(places[serial]);
+    if (!exact) blind_.insert({intent->unit.value, intent->move.value});
+  }
+}
+
+void Judge::LifeBegins() {
+  std::string why;
+  auto read = reader_.Read(disk_->Written(), &why);
+  if (!read) {
+    // Before the first commit there may be no tables yet.
+    if (!shadow_.units.empty() || !shadow_.places.empty())
+      Broken("durable", "the store cannot be read after a kill: " + why);
+    return;
+  }
+  const auto same = [&](const StoredPicture& picture) {
+    return read->places == picture.places && read->intents == picture.intents;
+  };
+  if (!same(shadow_) && !(in_flight_ && same(*in_flight_))) {
+    std::string first;
+    for (const auto& [serial, place] : shadow_.places)
+      if (first.empty() && (!read->places.contains(serial) || read->places[serial] != place))
+        first = fmt::format("place of serial {}", serial);
+    for (const auto& [serial, intent] : shadow_.intents)
+      if (first.empty() && (!read->intents.contains(serial) || read->intents[serial] != intent))
+        first = fmt::format("intent of serial {}", serial);
+    for (const auto& [serial, intent] : read->intents)
+      if (first.empty() && !shadow_.intents.contains(serial))
+        first = fmt::format("an intent of serial {} that nobody acknowledged", serial);
+    Broken("durable", "the store differs from what it acknowledged: " +
+                          (first.empty() ? std::string("a row more") : first));
+  }
+  shadow_ = std::move(*read);
+  in_flight_.reset();
+  told_.clear();
+  for (const auto& [serial, place] : shadow_.places) told_[serial].push_back(place);
+}
+
+const StoredPicture* Judge::Durable() {
+  if (durable_syncs_ != disk_->syncs()) {
+    std::string why;
+    durable_ = reader_.Read(disk_->Synced(), &why);
+    durable_syncs_ = disk_->syncs();
+  }
+  return durable_ ? &*durable_ : nullptr;
+}
+
+void Judge::Sends(BusId, const CanFrame& frame) {
+  constexpr std::uint32_t kStart = 1, kHome = 8;
+  const std::uint32_t function = frame.id >> 20 & 0x1f;
+  if (function != kStart && function != kHome) return;
+  const StoredPicture* durable = Durable();
+  if (durable == nullptr) return;
+  for (const auto& [serial, intent] : durable->intents) allowed_.insert({intent.unit, intent.move});
+}
+
+void Judge::Published(const StatusBatch& status) {
+  for (const UnitStatusValue& value : status.units) {
+    const auto row = plant_->layout().Find(value.unit);
+    if (!row || value.serial.value == 0) continue;
+    const Unit& unit = plant_->layout().unit(*row);
+    const UnitDrive& drive = plant_->drives()[row->value];
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const int witness = static_cast<int>(value.witness[axis]);
+      if (witness < 3) continue;  // told as not exact
+      const double step = DegreesPerVector(unit.axis[axis], drive.axis[axis]);
+      const auto vectors = std::llround(value.low_deg[axis] / step);
+      const auto known = told_.find(value.serial.value);
+      const bool stored =
+          known != told_.end() &&
+          std::ranges::any_of(known->second, [&](const StoredPlace& place) {
+            return place[axis].witness >= 3 && place[axis].low == vectors;
+          });
+      if (!stored)
+        Broken("told", fmt::format("unit {} axis {} is told to be {} at {}, which was never "
+                                   "acknowledged",
+                                   value.unit.value, axis, Name(value.witness[axis]), vectors));
+    }
+  }
+}
+
+void Judge::StopOrdered(HostInstant now, std::optional<UnitId> unit) {
+  for (std::size_t row = 0; row < seen_.size(); ++row)
+    if (!unit || plant_->layout().units()[row].id == *unit)
+      seen_[row].must_rest = std::min(seen_[row].must_rest, now + kStopWithin);
+}
+
+void Judge::Queues(std::size_t batches, std::span<const ShellFacts::Bus> buses) {
+  constexpr std::size_t kBatchesMax = 20'000;
+  if (batches > kBatchesMax) Broken("bound", fmt::format("{} batches wait", batches));
+  for (const ShellFacts::Bus& bus : buses)
+    if (bus.waiting > 2 * limits::kFramesPerBusQueued)
+      Broken("bound", fmt::format("{} frames wait on {}", bus.waiting, bus.port));
+}
+
+void Judge::Look(HostInstant now) {
+  now_ = now;
+  std::vector<sim::UnitTruth> truths;
+  truths.reserve(seen_.size());
+  for (std::size_t row = 0; row < seen_.size(); ++row) {
+    truths.push_back(plant_->world().Truth(row));
+    LookAtStarts(row, truths.back());
+    LookAtPlace(row, truths.back());
+    LookAtStop(row, truths.back());
+  }
+  LookForContact(truths);
+}
+
+void Judge::LookAtStarts(std::size_t row, const sim::UnitTruth& truth) {
+  Seen& seen = seen_[row];
+  if (truth.begun_twice > seen.begun_twice)
+    Broken("twice", fmt::format("unit {} began move {} twice", truth.id.value,
+                                truth.last_move.value));
+  seen.begun_twice = truth.begun_twice;
+  if (truth.moves_begun == seen.moves_begun) return;
+  seen.moves_begun = truth.moves_begun;
+  const auto allowed = allowed_.find({truth.id.value, truth.last_move.value});
+  if (allowed == allowed_.end())
+    Broken("start", fmt::format("unit {} began move {} without a durable intent", truth.id.value,
+                                truth.last_move.value));
+  else if (truth.state == UnitState::kMoving && blind_.contains(*allowed))
+    Broken("start", fmt::format("unit {} began move {} from a place that is not known",
+                                truth.id.value, truth.last_move.value));
+}
+
+std::optional<double> Judge::OffPlace(std::size_t row) const {
+  const sim::UnitTruth truth = plant_->world().Truth(row);
+  const auto unit = shadow_.units.find(truth.id.value);
+  if (unit == shadow_.units.end()) return std::nullopt;
+  const auto place = shadow_.places.find(unit->second.serial);
+  if (place == shadow_.places.end() || !IsExact(place->second)) return std::nullopt;
+  double off = 0;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    off = std::max(off, std::abs(truth.vectors[axis] -
+                                 static_cast<double>(place->second[axis].low)));
+  return off;
+}
+
+void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
+  const auto unit = shadow_.units.find(truth.id.value);
+  if (unit == shadow_.units.end()) return;
+  const std::uint32_t serial = unit->second.serial;
+  // Other hardware at this place has a place of its own; the store speaks of what was bound here.
+  if (serial != plant_->world().flash(truth.id).serial.value) return;
+  const double slack = troubles_->shifted[row] ? kJumpVectors : kLagVectors;
+  const auto place = shadow_.places.find(serial);
+  const auto intent = shadow_.intents.find(serial);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    double low = -1e18, high = 1e18;
+    if (intent != shadow_.intents.end()) {
+      low = static_cast<double>(intent->second.low[axis]);
+      high = static_cast<double>(intent->second.high[axis]);
+    } else if (place != shadow_.places.end() && place->second[axis].witness >= 1) {
+      low = static_cast<double>(place->second[axis].low);
+      high = static_cast<double>(place->second[axis].high);
+    }
+    const double off = std::max(low - truth.vectors[axis], truth.vectors[axis] - high);
+    if (off <= slack) continue;
+    Broken("place", fmt::format("unit {} axis {} is at {:.1f}, stored is {}{:.0f}..{:.0f}",
+                                truth.id.value, axis, truth.vectors[axis],
+                                intent != shadow_.intents.end() ? "an open move within " : "",
+                                low, high));
+  }
+}
+
+void Judge::LookAtStop(std::size_t row, const sim::UnitTruth& truth) {
+  Seen& seen = seen_[row];
+  if (now_ < seen.must_rest) return;
+  const HostInstant ordered = seen.must_rest - kStopWithin;
+  seen.must_rest = kNever;
+  const bool reached = ordered > troubles_->host && ordered > troubles_->buses[BusOf(row)] &&
+                       ordered > troubles_->deaf[row];
+  if (reached && Moves(truth) && truth.began < ordered)
+    Broken("stop", fmt::format("unit {} still moves {} ms after a stop", truth.id.value,
+                               kStopWithin.ns / 1'000'000));
+}
+
+void Judge::LookForContact(std::span<const sim::UnitTruth> truths) {
+  const auto units = plant_->layout().units();
+  const auto arm = [&](std::size_t row) {
+    const double theta = (truths[row].angle_deg[0] + units[row].axis[0].zero_deg) * kDegree;
+    const double phi = (truths[row].angle_deg[1] + units[row].axis[1].zero_deg) * kDegree;
+    const Point base{units[row].base_fp.x_mm, units[row].base_fp.y_mm};
+    const Point elbow = base + std::polar(units[row].axis[0].arm_mm, theta);
+    return std::pair(elbow, elbow + std::polar(units[row].axis[1].arm_mm, theta + phi));
+  };
+  std::vector<std::pair<Point, Point>> arms;
+  for (std::size_t row = 0; row < units.size(); ++row) arms.push_back(arm(row));
+  for (std::size_t i = 0; i < units.size(); ++i)
+    for (const std::size_t j : near_[i]) {
+      const double apart =
+          BetweenSegments(arms[i].first, arms[i].second, arms[j].first, arms[j].second);
+      const bool touch = apart < units[i].arm_half_width_mm + units[j].arm_half_width_mm;
+      if (!touch) {
+        touching_.erase({i, j});
+        continue;
+      }
+      if (!touching_.insert({i, j}).second) continue;
+      const HostInstant since = now_ - kContactAfter;
+      bool excused = risk_ || troubles_->host > since;
+      for (const std::size_t row : {i, j})
+        excused = excused || troubles_->buses[BusOf(row)] > since ||
+                  troubles_->deaf[row] > since || troubles_->shifted[row];
+      if (!excused)
+        Broken("contact", fmt::format("units {} and {} touch, {:.3f} mm apart", units[i].id.value,
+                                      units[j].id.value, apart));
+    }
+}
+
+}  // namespace focalfleet::soak

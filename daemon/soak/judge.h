@@ -1,0 +1,101 @@
+// The judge looks at a run from outside: at frames where a host gives them to its buses, at the disk
+// as a power cut would leave it, at what is told to readers and operators, and at where the units
+// truly are. It shares no code with the daemon's store, knowledge or planning. Its rules:
+//
+//   start      A unit begins a move only where an intent for it was durable when the start signal,
+//              or the order to home, was given to a bus; and the stored place was exact, unless it
+//              homes.
+//   place      A stored exact place is where the unit is. An open intent or an interval holds it.
+//   durable    What was acknowledged as committed is there after every kill and power cut, and
+//              nothing that was not offered is there.
+//   told       A place told to readers is one that the store has acknowledged.
+//   contact    No two arms touch, unless a fault kept every stop from one of them.
+//   stop       Within a bound after a stop was ordered, no reachable unit moves.
+//   twice      No move is begun twice.
+//   bound      Queues stay within their bounds.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/soak/plant.h"
+#include "daemon/soak/stored_picture.h"
+#include "daemon/soak/troubles.h"
+#include "daemon/status/shell_facts.h"
+#include "daemon/status/status_batch.h"
+#include "fleet/records.h"
+
+namespace focalfleet::soak {
+
+class Judge {
+ public:
+  Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles);
+
+  // ---- what it sees
+
+  void Commits(std::span<const Row> rows);
+  void Committed(std::span<const Row> rows, bool done);
+  void Published(const StatusBatch& status);
+  void Sends(BusId bus, const CanFrame& frame);
+  /// Looks at the true state; call it ten times a second or more often.
+  void Look(HostInstant now);
+  void StopOrdered(HostInstant now, std::optional<UnitId> unit);
+  /// A process starts on this disk: what it reads is judged.
+  void LifeBegins();
+  /// The state of the queues of a life.
+  void Queues(std::size_t batches, std::span<const ShellFacts::Bus> buses);
+  /// An operator takes the risk of contact from here on.
+  void RiskTaken() { risk_ = true; }
+
+  void Broken(const std::string& rule, const std::string& what);
+  [[nodiscard]] const std::vector<std::string>& broken() const { return broken_; }
+  /// The fleet as last acknowledged by the store.
+  [[nodiscard]] const StoredPicture& acknowledged() const { return shadow_; }
+  /// Distance of a unit from its stored exact place. Units: vectors; none: no such place.
+  [[nodiscard]] std::optional<double> OffPlace(std::size_t row) const;
+
+ private:
+  struct Seen {
+    std::uint32_t moves_begun = 0;
+    std::uint32_t begun_twice = 0;
+    HostInstant must_rest = kNever;  // after a stop
+  };
+  static void Apply(std::span<const Row> rows, StoredPicture* picture);
+  const StoredPicture* Durable();
+  void LookAtStarts(std::size_t row, const sim::UnitTruth& truth);
+  void LookAtPlace(std::size_t row, const sim::UnitTruth& truth);
+  void LookAtStop(std::size_t row, const sim::UnitTruth& truth);
+  void LookForContact(std::span<const sim::UnitTruth> truths);
+  void NoteBlind(std::span<const Row> rows);
+  [[nodiscard]] std::size_t BusOf(std::size_t row) const;
+
+  const Plant* plant_;
+  const MemoryDisk* disk_;
+  const Troubles* troubles_;
+  HostInstant now_{0};
+  PictureReader reader_;
+  std::optional<StoredPicture> durable_;
+  std::uint64_t durable_syncs_ = UINT64_MAX;
+  StoredPicture shadow_;                   // acknowledged
+  std::optional<StoredPicture> in_flight_; // with the batch that is being committed
+  std::map<std::uint32_t, std::deque<StoredPlace>> told_;  // acknowledged places, newest last
+  using Move = std::pair<std::uint32_t, std::uint32_t>;  // unit, move
+  std::set<Move> allowed_;                               // by a durable intent
+  std::set<Move> blind_;  // whose intent was acknowledged while the unit's place was not exact
+  std::vector<Seen> seen_;
+  std::vector<std::vector<std::size_t>> near_;
+  std::set<std::pair<std::size_t, std::size_t>> touching_;
+  bool risk_ = false;
+  std::vector<std::string> broken_;
+};
+
+}  // namespace focalfleet::soak

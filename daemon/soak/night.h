@@ -1,0 +1,99 @@
+// A night is one seed: the whole system on virtual time, in one thread, bit for bit the same each
+// time. Its first phase is one of safety: anything may fail, and the judge looks on. In the second,
+// of liveness, all faults have ended; operators set right what is not, and then the fleet must
+// carry out a configuration.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/journal/step_record.h"
+#include "daemon/soak/draws.h"
+#include "daemon/soak/fault_injector.h"
+#include "daemon/soak/judge.h"
+#include "daemon/soak/life.h"
+#include "daemon/soak/operators.h"
+
+namespace focalfleet::soak {
+
+struct NightResult {
+  std::uint64_t seed = 0;
+  std::vector<std::string> broken;  // rules, with time and reason; empty: none
+  FaultCounts reached{};
+  std::uint64_t digest = 0;
+  double virtual_s = 0;
+  std::uint64_t lives = 0;
+  std::uint64_t steps = 0;
+  std::uint64_t commits = 0;
+  std::uint64_t commits_failed = 0;
+  std::uint64_t frames = 0;
+  std::uint64_t answers = 0;
+  std::uint64_t units_begun = 0;
+  [[nodiscard]] bool ok() const { return broken.empty(); }
+};
+
+struct NightOptions {
+  /// One line for each change of state; none: nothing is told.
+  std::function<void(const std::string&)> tell;
+  /// Each step of each life is taken again by another coordinator, which must decide the same.
+  bool replay = false;
+  /// The log of the daemon; none: it is not kept.
+  std::function<void(const std::string&)> log;
+};
+
+class Night {
+ public:
+  Night(const Draws& draws, const NightOptions& options);
+  NightResult Run();
+
+ private:
+  Surroundings Around();
+  void RunUntil(HostInstant end, const std::function<bool()>& done = {});
+  void TurnOfLife();
+  void StartLife();
+  void Die(FaultSite site);
+  void OfHost(FaultSite site);
+  int OfDisk(DiskOperation operation);
+  void Passed(TurnPoint point);
+  void Committed(std::span<const Row> rows, bool done);
+  void Sends(BusId bus, const CanFrame& frame);
+  bool Hear(ClientId client, std::string_view line, bool last);
+  void Look();
+  void Tell(const std::string& what);
+  // ---- the second phase
+  void Converge();
+  bool WaitFor(std::uint64_t request, double seconds);
+  bool Settle(double seconds);
+  [[nodiscard]] std::vector<std::uint32_t> UnitsThat(
+      const std::function<bool(const UnitView&)>& wanted) const;
+  void SetRight();
+  void CheckEnd();
+
+  Draws draws_;
+  NightOptions options_;
+  Troubles troubles_;
+  FaultCounts reached_{};
+  NightResult result_;
+  std::unique_ptr<Plant> plant_;
+  std::unique_ptr<MemoryDisk> disk_;
+  std::unique_ptr<Judge> judge_;
+  std::unique_ptr<FaultInjector> faults_;
+  std::unique_ptr<Operators> operators_;
+  std::unique_ptr<Life> life_;
+  HostInstant now_;
+  HostInstant start_at_;
+  HostInstant frozen_until_;
+  HostInstant look_at_;
+  bool power_cut_ = false;  // the next death is one of the host's power
+  bool in_start_ = false;
+  std::optional<FaultSite> dying_;  // within SQLite, which cannot be left by an exception
+  std::string state_;       // as last told
+  std::unique_ptr<journal::Replayer> replayer_;  // of this life; none: it is not replayed
+  std::uint64_t digest_ = 0xcbf29ce484222325u;
+};
+
+}  // namespace focalfleet::soak

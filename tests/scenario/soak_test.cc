@@ -1,0 +1,131 @@
+// A few nights of the soak, so that each change meets some kills and faults. `focalfleet-sim soak`
+// runs as many as one likes. A seed that found a fault of the daemon stays here.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+
+#include "daemon/journal/fields.h"
+#include "daemon/journal/step_record.h"
+#include "daemon/soak/campaign.h"
+#include "daemon/soak/memory_disk.h"
+#include "daemon/soak/night.h"
+#include "daemon/store/store.h"
+
+namespace focalfleet::soak {
+namespace {
+
+NightResult RunSeed(std::uint64_t seed, std::uint32_t units = 0) {
+  DrawLimits limits;
+  if (units > 0) limits.units = units;
+  return Night(DrawSeed(seed, limits), {.replay = true}).Run();
+}
+
+void ExpectKept(std::uint64_t seed, std::uint32_t units = 0) {
+  const NightResult result = RunSeed(seed, units);
+  for (const std::string& broken : result.broken) ADD_FAILURE() << "seed " << seed << " " << broken;
+  EXPECT_GT(result.commits, 10u) << "seed " << seed << " stored nothing";
+}
+
+TEST(Soak, KeepsEveryRuleOverAFewSeeds) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) ExpectKept(seed, 19);
+}
+
+TEST(Soak, OneSeedIsOneRun) {
+  const NightResult once = RunSeed(3, 13), again = RunSeed(3, 13), other = RunSeed(4, 13);
+  EXPECT_EQ(once.digest, again.digest);
+  EXPECT_EQ(once.frames, again.frames);
+  EXPECT_NE(once.digest, other.digest);
+}
+
+TEST(Soak, SeedsAreReadAsRangeOrNumber) {
+  EXPECT_EQ(ParseSeeds("7")->last, 7u);
+  EXPECT_EQ(ParseSeeds("2..9")->last, 9u);
+  for (const char* wrong : {"", "a", "9..2", "1..", "..3", "1-3"})
+    EXPECT_FALSE(ParseSeeds(wrong)) << wrong;
+}
+
+TEST(SoakSummary, NamesFailedSeedsAndTakesEachOnce) {
+  const Draws draws = DrawSeed(5, {});
+  NightResult result{.seed = 5, .broken = {"1.0 s: place: unit 3 is elsewhere"}};
+  Summary summary;
+  for (int n = 0; n < 2; ++n) ASSERT_TRUE(summary.Take(JsonOf(result, draws)));
+  EXPECT_EQ(summary.seeds(), 1u);
+  EXPECT_EQ(summary.failed().at(5), result.broken[0]);
+  EXPECT_FALSE(summary.Take(Json{{"seed", 6}}));
+}
+
+// The judge's own parts must be able to see what they look for.
+
+StoreOptions On(const MemoryDisk& disk) { return {.vfs = disk.name(), .vfs_has_files = true}; }
+
+std::vector<Row> RowsOf(std::uint32_t serial) {
+  return {VectorRow{.serial = {serial},
+                    .knowledge = Exactly(Witness::kReported, Pose{10, 20}),
+                    .subdivision = {96, 96}}};
+}
+
+TEST(MemoryDisk, KeepsWhatWasAcknowledgedOverACutAndAKill) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Rng rng(seed);
+    MemoryDisk disk("memory-disk-test");
+    {
+      auto store = Store::Open("s", On(disk));
+      ASSERT_TRUE(store) << store.error().text;
+      for (std::uint32_t n = 1; n <= seed; ++n)
+        ASSERT_TRUE((*store)->Commit(RowsOf(n), {1'000'000}));
+      if (seed % 2 == 0)
+        disk.CutPower(&rng);
+      else
+        disk.Kill();
+    }
+    auto store = Store::Open("s", On(disk));
+    ASSERT_TRUE(store) << store.error().text;
+    EXPECT_EQ((*store)->Load()->vectors.size(), seed);
+  }
+}
+
+TEST(MemoryDisk, LosesWhatWasNotSyncedAndDoesNothingForTheDead) {
+  MemoryDisk disk("memory-disk-test");
+  auto store = Store::Open("s", On(disk));
+  ASSERT_TRUE(store);
+  ASSERT_TRUE((*store)->Commit(RowsOf(1), {1'000'000}));
+  disk.fails = [](DiskOperation operation) {
+    return operation == DiskOperation::kSync ? SQLITE_IOERR_FSYNC : SQLITE_OK;
+  };
+  EXPECT_FALSE((*store)->Commit(RowsOf(2), {1'000'000}));
+  disk.fails = [](DiskOperation) { return SQLITE_OK; };
+  disk.Kill();
+  EXPECT_FALSE((*store)->Commit(RowsOf(3), {1'000'000}));
+}
+
+TEST(StepRecord, ReadsBackWhatItWrote) {
+  const std::vector<Row> rows = {
+      MeasurementRow{.exposure = 7, .unit = {3}, .place = Pose{1, -2}, .target_id = "a"},
+      OpenAlarmRow{.id = 4, .text = "t"}, ModelRow{.entry = 1, .name = "m"}};
+  std::string bytes;
+  journal::WriteFields(rows, &bytes);
+  std::vector<Row> read;
+  journal::ByteReader reader{bytes};
+  journal::ReadFields(&reader, &read);
+  ASSERT_TRUE(reader.good && reader.left.empty());
+  std::string again;
+  journal::WriteFields(read, &again);
+  EXPECT_EQ(again, bytes);
+  EXPECT_EQ(std::get<MeasurementRow>(read[0]).target_id, "a");
+  EXPECT_EQ(std::get<OpenAlarmRow>(read[1]), std::get<OpenAlarmRow>(rows[1]));
+}
+
+TEST(StepRecord, BytesThatAreNoneAreRefused) {
+  std::string bytes;
+  journal::WriteFields(std::vector<Row>{EnableRow{.unit = {3}, .reason = "why"}}, &bytes);
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    std::vector<Row> read;
+    journal::ByteReader reader{std::string_view(bytes).substr(0, size)};
+    journal::ReadFields(&reader, &read);
+    EXPECT_FALSE(reader.good) << size;
+  }
+}
+
+}  // namespace
+}  // namespace focalfleet::soak
