@@ -22,8 +22,7 @@ std::string Number(double value) {
 }
 
 std::string At(const Targets& targets, const TargetRow& row) {
-  return PlaceIn(targets.source, row.line) + ": unit " +
-         std::to_string(row.unit.value);
+  return PlaceIn(targets.source, row.line) + ": unit " + std::to_string(row.unit.value);
 }
 
 std::string RangeText(const AxisGeometry& axis) {

@@ -94,11 +94,11 @@ ExitCode RunImport(const Context& context, const ImportOptions& options) {
                {"out", options.out}});
   }
   ReportLeftOut(context, *plate, options.out);
-  Say(context, fmt::format("{}: {}, {} of them disabled; {}, {}, {}", options.out,
-                           Count(plate->units.size(), "unit", "units"), disabled,
-                           Count(targets, "target", "targets"),
-                           Count(plate->moves.size(), "move", "moves"),
-                           Count(plate->obstacles.size(), "obstacle", "obstacles")));
+  Say(context,
+      fmt::format("{}: {}, {} of them disabled; {}, {}, {}", options.out,
+                  Count(plate->units.size(), "unit", "units"), disabled,
+                  Count(targets, "target", "targets"), Count(plate->moves.size(), "move", "moves"),
+                  Count(plate->obstacles.size(), "obstacle", "obstacles")));
   return ExitCode::kOk;
 }
 
@@ -117,11 +117,11 @@ CLI::Option* AddFiles(CLI::App* command, const char* name, std::vector<std::stri
 }
 
 void AddImportOf(const Project& project, CLI::App* parent, CommandLine* line) {
-  CLI::App* command =
-      AddCommand(parent, project.name,
-                 fmt::format("Units, targets, state and moves of {} and robots like it", project.robots)
-                     .c_str(),
-                 project.import_example);
+  CLI::App* command = AddCommand(
+      parent, project.name,
+      fmt::format("Units, targets, state and moves of {} and robots like it", project.robots)
+          .c_str(),
+      project.import_example);
   auto options = std::make_shared<ImportOptions>();
   options->project = &project;
   SourceFiles* files = &options->files;
@@ -136,8 +136,9 @@ void AddImportOf(const Project& project, CLI::App* parent, CommandLine* line) {
   if (std::string_view(project.name) == "pfs")
     AddFiles(command, "--fibre-map", &files->fibre_map, "Table of cobraId and fiberId");
   if (std::string_view(project.name) == "desi")
-    command->add_flag("--from-camera", files->from_camera,
-                      "Moves begin where the camera saw the fibre (fvc_t, fvc_p), not at the count");
+    command->add_flag(
+        "--from-camera", files->from_camera,
+        "Moves begin where the camera saw the fibre (fvc_t, fvc_p), not at the count");
   command
       ->add_option("--gear", files->gears, "Motor turns per axis turn, for both axes or theta phi")
       ->expected(1, 2)
@@ -167,8 +168,10 @@ void AddExportOf(const Project& project, CLI::App* parent, CommandLine* line) {
       ->required();
   AddFile(command, "--targets", &request->targets, "targets.csv (default: the import's)");
   AddFile(command, "--plan", &request->plan, "plan.csv: units are where it ends");
-  AddFile(command, "--from", &request->state, "state.csv: where the plan begins (default: the import's)");
-  AddFile(command, "--fibres", &request->fibres, "Measured fibres, as `measurements --out` writes them");
+  AddFile(command, "--from", &request->state,
+          "state.csv: where the plan begins (default: the import's)");
+  AddFile(command, "--fibres", &request->fibres,
+          "Measured fibres, as `measurements --out` writes them");
   AddFile(command, "--out", &request->out, "File to write")->required();
   OnChosen(line, command, options, RunExport);
 }

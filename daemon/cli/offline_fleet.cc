@@ -78,7 +78,8 @@ Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) 
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTable(context, files.units, "unit_id"));
   Layout::Options options{.clearance_mm = files.clearance_mm};
   if (!files.obstacles.empty()) {
-    FOCALFLEET_TRY_ASSIGN(const std::string obstacles, ReadTable(context, files.obstacles, "obstacle_id"));
+    FOCALFLEET_TRY_ASSIGN(const std::string obstacles,
+                          ReadTable(context, files.obstacles, "obstacle_id"));
     FOCALFLEET_TRY_ASSIGN(options.obstacles, ReadObstacles(obstacles, files.obstacles));
   }
   // Ignored columns are reported: a misspelt column would otherwise be ignored without a message.

@@ -1,5 +1,5 @@
-// Tables that commands take. stderr names a file that is not plain CSV: which of its tables was read,
-// how many rows it has, and what was passed over.
+// Tables that commands take. stderr names a file that is not plain CSV: which of its tables was
+// read, how many rows it has, and what was passed over.
 #pragma once
 
 #include <string>

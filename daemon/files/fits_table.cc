@@ -304,10 +304,10 @@ void WriteKey(fitsfile* file, const FitsKey& key, int* status) {
 }  // namespace
 
 std::size_t FitsTable::rows() const {
-  return columns.empty()
-             ? 0
-             : std::visit([](const auto& values) { return values.size(); }, columns.front().values) /
-                   columns.front().elements;
+  return columns.empty() ? 0
+                         : std::visit([](const auto& values) { return values.size(); },
+                                      columns.front().values) /
+                               columns.front().elements;
 }
 
 const FitsColumn* FitsTable::Find(std::string_view column) const {

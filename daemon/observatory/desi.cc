@@ -82,7 +82,9 @@ void TakeGeometry(const LayoutColumns& columns, std::uint32_t petal, bool may_be
 
 std::string ReasonOf(CsvRow* row) {
   std::string reason;
-  const auto add = [&](const char* text) { reason += (reason.empty() ? "" : "; ") + std::string(text); };
+  const auto add = [&](const char* text) {
+    reason += (reason.empty() ? "" : "; ") + std::string(text);
+  };
   if (row->FlagIfAny("device_classified_nonfunctional").value_or(false))
     add("classified nonfunctional");
   if (!row->FlagIfAny("fiber_intact").value_or(true)) add("fibre broken");
@@ -199,10 +201,10 @@ Status TakeTargets(const std::vector<NamedTable>& tables, Plate* plate) {
     const auto leave = [&](const std::string& unit, const char* reason) {
       LeaveOut(*source, row.at(), unit, "target", reason, plate);
     };
-    const std::string location =
-        by_location ? row.Text("location")
-                    : std::to_string(row.Integer("petal_loc", {0, 9}) * 1000 +
-                                     row.Integer("device_loc", {0, 999}));
+    const std::string location = by_location
+                                     ? row.Text("location")
+                                     : std::to_string(row.Integer("petal_loc", {0, 9}) * 1000 +
+                                                      row.Integer("device_loc", {0, 999}));
     if (row.Has("device_type") && row.Text("device_type") != "POS")
       return leave(location, "no positioner");
     PlateUnit* unit = plate->FindBy("location", location);

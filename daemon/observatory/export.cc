@@ -100,11 +100,12 @@ Status TakePlan(const std::string& path, Rows* rows) {
     const std::string axis = row.Text("axis");
     const double end_s = row.Number("t1_s");
     const double to_deg = row.Number("to_deg");
-    if (axis != "theta" && axis != "phi") row.Reject("axis", "'" + axis + "' is neither theta nor phi");
+    if (axis != "theta" && axis != "phi")
+      row.Reject("axis", "'" + axis + "' is neither theta nor phi");
     if (row.error() || of == nullptr) return;
     if (!of->pose)
-      return row.RejectRow("unit " + std::to_string(of->unit.id.value) + " has no state to begin from",
-                           "no state");
+      return row.RejectRow(
+          "unit " + std::to_string(of->unit.id.value) + " has no state to begin from", "no state");
     const auto [last, fresh] = last_s.try_emplace({of->unit.id.value, axis}, end_s);
     if (!fresh && end_s < last->second) return;
     last->second = end_s;
@@ -118,8 +119,8 @@ Status TakeTargetsOf(const std::string& path, Rows* rows) {
   for (const TargetRow& target : targets.rows) {
     const auto found = rows->find(target.unit.value);
     if (found == rows->end())
-      return Fail(ErrorCode::kInvalid, fmt::format("{}: unit {} is no unit of the import", path,
-                                                   target.unit.value));
+      return Fail(ErrorCode::kInvalid,
+                  fmt::format("{}: unit {} is no unit of the import", path, target.unit.value));
     ExportRow& row = found->second;
     row.target_id = target.target_id;
     row.priority = target.priority;
@@ -290,8 +291,7 @@ Result<std::size_t> ExportSdss(const ExportRequest& request) {
                           row.Id("holeID"), fibre.type, is_assigned ? 1 : 0,
                           is_assigned && row.measured ? 1 : 0, row.unit.enabled ? 1 : 0, place.x_mm,
                           place.y_mm, row.pose ? row.pose->theta_deg : kNone,
-                          row.pose ? row.pose->phi_deg : kNone,
-                          catalogue < 0 ? kNone : catalogue);
+                          row.pose ? row.pose->phi_deg : kNone, catalogue < 0 ? kNone : catalogue);
     }
   }
   FOCALFLEET_TRY(WriteFileAtomically(request.out, text));
@@ -339,7 +339,8 @@ Result<std::size_t> ExportMoons(const ExportRequest& request) {
     if (!place) continue;
     const auto [r_mm, theta_deg] = PolarOf(*place);
     const std::string parity = row.Id("parity").empty() ? "R" : row.Id("parity");
-    text += fmt::format("{:3} {:10.5f} {:10.5f} {} {:g}\n", id, r_mm, theta_deg, parity, row.priority);
+    text +=
+        fmt::format("{:3} {:10.5f} {:10.5f} {} {:g}\n", id, r_mm, theta_deg, parity, row.priority);
     ++count;
   }
   FOCALFLEET_TRY(WriteFileAtomically(request.out, text));

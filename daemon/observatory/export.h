@@ -1,5 +1,5 @@
-// The way back: a configuration, and the fibres as they were measured, in the form that the project's
-// own pipeline reads. The folder of an import knows the units and their other names.
+// The way back: a configuration, and the fibres as they were measured, in the form that the
+// project's own pipeline reads. The folder of an import knows the units and their other names.
 #pragma once
 
 #include <string>
@@ -26,7 +26,7 @@ Result<std::size_t> ExportPfs(const ExportRequest& request);
 /// MOONS: lines of positioner, R, THETA, parity, priority.
 Result<std::size_t> ExportMoons(const ExportRequest& request);
 
-// All return the number of units that the file names. Errors: as ReadTables and the writers; kInvalid:
-// a unit that the folder does not have, an import of another project.
+// All return the number of units that the file names. Errors: as ReadTables and the writers;
+// kInvalid: a unit that the folder does not have, an import of another project.
 
 }  // namespace focalfleet::observatory

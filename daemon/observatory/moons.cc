@@ -44,7 +44,8 @@ class Parameters {
   }
   [[nodiscard]] Result<double> Number(const std::string& key) const {
     const auto found = values_.find(key);
-    if (found == values_.end()) return Fail(ErrorCode::kInvalid, file_ + ": key " + key + " is missing");
+    if (found == values_.end())
+      return Fail(ErrorCode::kInvalid, file_ + ": key " + key + " is missing");
     const auto value = ParseNumber(found->second.text);
     if (value && std::isfinite(*value)) return *value;
     return Fail(ErrorCode::kInvalid, file_ + ":" + std::to_string(found->second.line) + ": key " +
@@ -216,8 +217,9 @@ Result<NamedTable> ReadTargetLines(const std::string& path, const Plate& plate) 
     constexpr std::size_t kShort = 5;
     constexpr std::size_t kLong = 7;
     if (cells.size() != kShort && cells.size() != kLong)
-      return fail(std::to_string(cells.size()) + " values: 5 are expected (positioner R THETA parity "
-                                                 "priority), or the 7 of an assignment");
+      return fail(std::to_string(cells.size()) +
+                  " values: 5 are expected (positioner R THETA parity "
+                  "priority), or the 7 of an assignment");
     csv += "#@ " + std::to_string(line) + "\n";
     CsvWriter writer{std::vector<std::string_view>{"unit", "r", "theta", "parity", "priority"}};
     if (cells.size() == kShort) {
@@ -247,7 +249,8 @@ Status TakeTargets(const std::string& file, Plate* plate) {
     const double theta_deg = row.Number("theta");
     const double priority = row.NumberIfAny("priority").value_or(0);
     const std::string parity = row.Text("parity");
-    if (parity != "L" && parity != "R") row.Reject("parity", Quoted(parity) + " is neither L nor R");
+    if (parity != "L" && parity != "R")
+      row.Reject("parity", Quoted(parity) + " is neither L nor R");
     if (row.error()) return;
     PlateUnit* unit = plate->Find(UnitId{number});
     if (unit == nullptr)

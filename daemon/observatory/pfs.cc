@@ -30,7 +30,8 @@ constexpr std::int64_t kInOrder = 1;
 std::string ReasonOf(std::int64_t status) {
   std::string reason;
   for (const StatusBit& known : kStatusBits)
-    if ((status & known.bit) != 0) reason += (reason.empty() ? "" : "; ") + std::string(known.reason);
+    if ((status & known.bit) != 0)
+      reason += (reason.empty() ? "" : "; ") + std::string(known.reason);
   if (reason.empty() && (status & kInOrder) == 0)
     reason = "Status " + std::to_string(status) + " is not in order";
   return reason;
@@ -42,9 +43,9 @@ double ScaleOf(const NamedTable& source, CsvRow* row) {
   if (row->error() || link <= kLongestArm_mm) return 1;
   const auto pixel_um = row->NumberIfAny("Pixel_scale");
   if (!pixel_um || *pixel_um <= 0 || link * *pixel_um * 1e-3 > kLongestArm_mm) {
-    row->Reject("Link1_Link_Length",
-                row->Text("Link1_Link_Length") + " is no length in mm, and no Pixel_scale (um) in " +
-                    source.table.file() + " makes it one");
+    row->Reject("Link1_Link_Length", row->Text("Link1_Link_Length") +
+                                         " is no length in mm, and no Pixel_scale (um) in " +
+                                         source.table.file() + " makes it one");
     return 1;
   }
   return *pixel_um * 1e-3;
@@ -64,15 +65,16 @@ void TakeRanges(CsvRow* row, Unit* unit) {
     return;
   }
   // The two stops overlap: the axis turns by one turn and the way from the one to the other.
-  const double way = row->NumberIfAny("CW_Global_base_ori_z").value_or(theta.zero_deg) - theta.zero_deg;
+  const double way =
+      row->NumberIfAny("CW_Global_base_ori_z").value_or(theta.zero_deg) - theta.zero_deg;
   theta.max_deg = kTurn / 2 + way + kTurn / 2 - kTurn * std::floor((way + kTurn / 2) / kTurn);
 }
 
 Status TakeLayout(const NamedTable& source, const SourceFiles& files, Plate* plate) {
-  FOCALFLEET_TRY(source.table.Require(
-      {"Module_Id", "Positioner_Id", "Global_base_pos_x", "Global_base_pos_y", "Link1_Link_Length",
-       "Link2_Link_Length", "CCW_Global_base_ori_z", "Joint2_CCW_limit_angle",
-       "Joint2_CW_limit_angle"}));
+  FOCALFLEET_TRY(
+      source.table.Require({"Module_Id", "Positioner_Id", "Global_base_pos_x", "Global_base_pos_y",
+                            "Link1_Link_Length", "Link2_Link_Length", "CCW_Global_base_ori_z",
+                            "Joint2_CCW_limit_angle", "Joint2_CW_limit_angle"}));
   return source.table.ReadRows([&](CsvRow& row) {
     const std::int64_t module = row.Integer("Module_Id", {1, 1000});
     const std::int64_t place = row.Integer("Positioner_Id", {1, kCobrasOfAModule});
@@ -108,10 +110,13 @@ Status TakeFibreMap(const std::vector<NamedTable>& tables, Plate* plate) {
       const std::int64_t fibre = row.Integer("fiberId", {0, 1 << 20});
       if (row.error() || !cobra) return;
       PlateUnit* unit = plate->Find(UnitId{static_cast<std::uint32_t>(*cobra)});
-      if (unit == nullptr) return;  // fibres of the engineers, and modules that are not in the layout
+      if (unit == nullptr)
+        return;  // fibres of the engineers, and modules that are not in the layout
       const std::string text = std::to_string(fibre);
       unit->ids["fiberId"] = text;
-      if (!plate->index.emplace("fiberId=" + text, plate->index.at("unit_id=" + row.Text("cobraId"))).second)
+      if (!plate->index
+               .emplace("fiberId=" + text, plate->index.at("unit_id=" + row.Text("cobraId")))
+               .second)
         row.Reject("fiberId", text + " is there twice");
     }));
   }
@@ -143,14 +148,15 @@ Status TakeTargets(const std::vector<NamedTable>& tables, Plate* plate) {
   const bool mapped = std::ranges::any_of(
       plate->units, [](const PlateUnit& unit) { return unit.ids.contains("fiberId"); });
   if (!by_cobra && !mapped)
-    return Fail(ErrorCode::kInvalid, table.file() + ": fibres are named by fiberId, so a table of "
-                                                    "cobraId and fiberId is needed (--fibre-map)");
+    return Fail(ErrorCode::kInvalid, table.file() +
+                                         ": fibres are named by fiberId, so a table of "
+                                         "cobraId and fiberId is needed (--fibre-map)");
   plate->targets = Targets{.source = table.file(), .rows = {}};
   std::unordered_map<std::uint32_t, std::size_t> row_of;
   return table.ReadRows([&](CsvRow& row) {
     const std::string fibre = row.Text("fiberId");
-    PlateUnit* unit = by_cobra ? plate->FindBy("cobraId", row.Text("cobraId"))
-                               : plate->FindBy("fiberId", fibre);
+    PlateUnit* unit =
+        by_cobra ? plate->FindBy("cobraId", row.Text("cobraId")) : plate->FindBy("fiberId", fibre);
     const auto leave = [&](const char* reason) {
       LeaveOut(*source, row.at(), "fibre " + fibre, "target", reason, plate);
     };
@@ -213,9 +219,8 @@ Result<std::unordered_map<std::string, Exposure>> ReadExposures(const NamedTable
   FOCALFLEET_TRY(source->table.ReadRows([&](CsvRow& row) {
     Exposure exposure;
     exposure.t_s = SecondsOf(row.Text("taken_at"));
-    constexpr std::pair<const char*, const char*> kMore[] = {{"altitude", "elevation_deg"},
-                                                             {"insrot", "insrot_deg"},
-                                                             {"mcs_m1_temperature", "temp_C"}};
+    constexpr std::pair<const char*, const char*> kMore[] = {
+        {"altitude", "elevation_deg"}, {"insrot", "insrot_deg"}, {"mcs_m1_temperature", "temp_C"}};
     for (const auto& [column, ours] : kMore)
       if (const auto value = row.NumberIfAny(column)) exposure.more[ours] = *value;
     exposures[row.Text("mcs_frame_id")] = std::move(exposure);
@@ -229,14 +234,14 @@ struct Sent {
 };
 
 Status TakeMoves(const std::vector<NamedTable>& tables, Plate* plate) {
-  FOCALFLEET_TRY_ASSIGN(const NamedTable* sent,
-                        Need(tables, {"pfs_visit_id", "iteration", "cobra_id", "motor_target_theta",
-                                      "motor_target_phi"},
-                             "moves"));
-  FOCALFLEET_TRY_ASSIGN(const NamedTable* seen,
-                        Need(tables, {"pfs_visit_id", "iteration", "cobra_id", "pfi_center_x_mm",
-                                      "pfi_center_y_mm"},
-                             "measured places"));
+  FOCALFLEET_TRY_ASSIGN(const NamedTable* sent, Need(tables,
+                                                     {"pfs_visit_id", "iteration", "cobra_id",
+                                                      "motor_target_theta", "motor_target_phi"},
+                                                     "moves"));
+  FOCALFLEET_TRY_ASSIGN(
+      const NamedTable* seen,
+      Need(tables, {"pfs_visit_id", "iteration", "cobra_id", "pfi_center_x_mm", "pfi_center_y_mm"},
+           "measured places"));
   FOCALFLEET_TRY_ASSIGN(const auto matches, ReadMatches(*seen));
   FOCALFLEET_TRY_ASSIGN(const auto exposures,
                         ReadExposures(WithColumns(tables, {"mcs_frame_id", "taken_at"})));
@@ -248,7 +253,8 @@ Status TakeMoves(const std::vector<NamedTable>& tables, Plate* plate) {
     if (row.error()) return;
     if (!theta_rad || !phi_rad)
       return LeaveOut(*sent, row.at(), row.Text("cobra_id"), "move", "no angles", plate);
-    if (!moves.emplace(key, Sent{row.at(), {*theta_rad * kDegPerRad, *phi_rad * kDegPerRad}}).second)
+    if (!moves.emplace(key, Sent{row.at(), {*theta_rad * kDegPerRad, *phi_rad * kDegPerRad}})
+             .second)
       row.RejectRow("cobra " + row.Text("cobra_id") + " has this visit and iteration twice",
                     "a move twice");
   }));

@@ -1,7 +1,7 @@
-// PFS and robots like its own (Cobras). Layout: XML of modules. State: angles in a table by cobra_id.
-// Targets: the table DESIGN of a pfsDesign or CONFIG of a pfsConfig, with a map of fibres. Moves: the
-// tables cobra_move and cobra_match of the operational database, with mcs_exposure for times.
-// docs/observatories.md has the columns.
+// PFS and robots like its own (Cobras). Layout: XML of modules. State: angles in a table by
+// cobra_id. Targets: the table DESIGN of a pfsDesign or CONFIG of a pfsConfig, with a map of
+// fibres. Moves: the tables cobra_move and cobra_match of the operational database, with
+// mcs_exposure for times. docs/observatories.md has the columns.
 //
 //   unit_id = (Module_Id - 1) * 57 + Positioner_Id, the database's cobra_id
 //   theta is counted from the counter-clockwise stop: theta_zero = CCW_Global_base_ori_z

@@ -314,11 +314,14 @@ Status WritePlate(const Plate& plate, const std::string& project, const std::str
   for (const PlateUnit& unit : plate.units) units.push_back(unit.unit);
   FOCALFLEET_TRY(Layout::Create(units, {.obstacles = plate.obstacles}));
   std::vector<std::pair<std::string, std::string>> files = {
-      {"units.csv", WriteUnits(units)},        {"origin.csv", OriginText(plate, project)},
-      {"state.csv", StateText(plate)},         {"disabled.csv", DisabledText(plate)},
+      {"units.csv", WriteUnits(units)},
+      {"origin.csv", OriginText(plate, project)},
+      {"state.csv", StateText(plate)},
+      {"disabled.csv", DisabledText(plate)},
       {"obstacles.csv", WriteObstacles(plate.obstacles)},
       {"left_out.csv", LeftOutText(plate)}};
-  if (!plate.fiducials.empty()) files.emplace_back("fiducials.csv", WriteFiducials(plate.fiducials));
+  if (!plate.fiducials.empty())
+    files.emplace_back("fiducials.csv", WriteFiducials(plate.fiducials));
   if (plate.targets) files.emplace_back("targets.csv", WriteTargets(*plate.targets));
   if (!plate.moves.empty()) files.emplace_back("moves.csv", MovesText(plate));
   std::error_code problem;
@@ -329,8 +332,7 @@ Status WritePlate(const Plate& plate, const std::string& project, const std::str
   if (std::filesystem::exists(path / "origin.csv", problem))
     for (const char* old : {"fiducials.csv", "targets.csv", "moves.csv"})
       std::filesystem::remove(path / old, problem);
-  for (const auto& [name, text] : files)
-    FOCALFLEET_TRY(WriteFileAtomically(path / name, text));
+  for (const auto& [name, text] : files) FOCALFLEET_TRY(WriteFileAtomically(path / name, text));
   return {};
 }
 

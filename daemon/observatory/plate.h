@@ -1,8 +1,8 @@
-// Plate is a focal plane with its configuration, state and moves as another project's files describe
-// it, on the way into this project's tables. Each project has a room of its own that fills a Plate
-// (desi.h, sdss.h, pfs.h, moons.h); WritePlate writes the folder. A row that cannot be taken without
-// harm to the others is left out, with its place and reason. A fault that would make numbers wrong
-// refuses the file.
+// Plate is a focal plane with its configuration, state and moves as another project's files
+// describe it, on the way into this project's tables. Each project has a room of its own that fills
+// a Plate (desi.h, sdss.h, pfs.h, moons.h); WritePlate writes the folder. A row that cannot be
+// taken without harm to the others is left out, with its place and reason. A fault that would make
+// numbers wrong refuses the file.
 #pragma once
 
 #include <map>
@@ -26,10 +26,10 @@ struct AnglesDeg {
 
 struct PlateUnit {
   Unit unit;
-  std::string name;                       // as the project calls it
+  std::string name;                        // as the project calls it
   std::map<std::string, std::string> ids;  // its other names, by column of origin.csv
-  std::string reason;                     // why it is disabled; empty: it is not
-  std::optional<AnglesDeg> stands;        // empty: no file gives it
+  std::string reason;                      // why it is disabled; empty: it is not
+  std::optional<AnglesDeg> stands;         // empty: no file gives it
 };
 
 /// A row that was not taken.
@@ -78,10 +78,10 @@ struct SourceFiles {
   std::vector<std::string> fiducials;
   std::vector<std::string> disabled;
   std::vector<std::string> fibre_map;
-  std::vector<double> gears;          // empty: of the project; one for both axes, or theta and phi
-  double arm_half_width_mm = 0;       // 0: of the layout
-  double fiducial_radius_mm = 0;      // above 0: fiducials are obstacles, too
-  bool from_camera = false;           // moves begin where the camera saw the fibre
+  std::vector<double> gears;      // empty: of the project; one for both axes, or theta and phi
+  double arm_half_width_mm = 0;   // 0: of the layout
+  double fiducial_radius_mm = 0;  // above 0: fiducials are obstacles, too
+  bool from_camera = false;       // moves begin where the camera saw the fibre
 };
 
 // ---- Functions for the rooms of the projects

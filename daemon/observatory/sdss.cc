@@ -34,10 +34,11 @@ Result<Holes> ReadHoles(const NamedTable& source) {
     const double iy = row.Number("iy");
     const Hole hole{{row.NumberIn("xWok", "mm"), row.NumberIn("yWok", "mm")},
                     std::atan2(iy, ix) * kDegPerRad};
-    const double turned = ix * row.NumberIfAny("jy").value_or(ix) -
-                          iy * row.NumberIfAny("jx").value_or(-iy);
+    const double turned =
+        ix * row.NumberIfAny("jy").value_or(ix) - iy * row.NumberIfAny("jx").value_or(-iy);
     if (row.error()) return;
-    if (turned <= 0) return row.RejectRow("hole " + id + ": its axes i, j are mirrored", "mirrored");
+    if (turned <= 0)
+      return row.RejectRow("hole " + id + ": its axes i, j are mirrored", "mirrored");
     if (!holes.emplace(id, hole).second)
       return row.RejectRow("hole " + id + ": is there twice", "is there twice");
   }));
@@ -49,7 +50,8 @@ Status TakeLayout(const NamedTable& source, const Holes& holes, const SourceFile
   return source.table.ReadRows([&](CsvRow& row) {
     PlateUnit unit;
     unit.name = row.Text("positionerID");
-    unit.unit.id = UnitId{static_cast<std::uint32_t>(row.Integer("positionerID", {0, UINT32_MAX - 1}))};
+    unit.unit.id =
+        UnitId{static_cast<std::uint32_t>(row.Integer("positionerID", {0, UINT32_MAX - 1}))};
     const auto hole = holes.find(row.Text("holeID"));
     if (hole == holes.end())
       return row.Reject("holeID", Quoted(row.Text("holeID")) + " is no hole of the table of holes");
@@ -57,15 +59,16 @@ Status TakeLayout(const NamedTable& source, const Holes& holes, const SourceFile
     const double met_y = row.NumberIn("metY", "mm");
     unit.unit.base_fp = {hole->second.at.x_mm + row.NumberInIfAny("dx", "mm").value_or(0),
                          hole->second.at.y_mm + row.NumberInIfAny("dy", "mm").value_or(0)};
-    unit.unit.axis[0] = {.arm_mm = row.NumberIn("alphaArmLen", "mm"),
-                         .zero_deg = row.NumberIn("alphaOffset", "deg") + hole->second.direction_deg,
-                         .min_deg = 0,
-                         .max_deg = kAlphaEndDeg};
-    unit.unit.axis[1] = {.arm_mm = std::hypot(met_x, met_y),
-                         .zero_deg = row.NumberIn("betaOffset", "deg") +
-                                     std::atan2(met_y, met_x) * kDegPerRad,
-                         .min_deg = 0,
-                         .max_deg = kBetaEndDeg};
+    unit.unit.axis[0] = {
+        .arm_mm = row.NumberIn("alphaArmLen", "mm"),
+        .zero_deg = row.NumberIn("alphaOffset", "deg") + hole->second.direction_deg,
+        .min_deg = 0,
+        .max_deg = kAlphaEndDeg};
+    unit.unit.axis[1] = {
+        .arm_mm = std::hypot(met_x, met_y),
+        .zero_deg = row.NumberIn("betaOffset", "deg") + std::atan2(met_y, met_x) * kDegPerRad,
+        .min_deg = 0,
+        .max_deg = kBetaEndDeg};
     SetGears(files, kGear, kGear, &unit.unit);
     unit.ids["holeID"] = row.Text("holeID");
     for (const char* column : kOffsets)
@@ -82,8 +85,7 @@ bool IsGiven(std::optional<double> value) { return value && *value > kNoValue + 
 PlateUnit* UnitOfRow(const NamedTable& source, CsvRow* row, const std::string& column,
                      const char* what, Plate* plate) {
   const auto number = row->IntegerIfAny(column, {0, UINT32_MAX - 1});
-  PlateUnit* unit =
-      number ? plate->Find(UnitId{static_cast<std::uint32_t>(*number)}) : nullptr;
+  PlateUnit* unit = number ? plate->Find(UnitId{static_cast<std::uint32_t>(*number)}) : nullptr;
   if (unit == nullptr && !row->error())
     LeaveOut(source, row->at(), row->Text(column), what, "not in the layout", plate);
   return unit;
@@ -125,7 +127,8 @@ Status TakeTargets(const std::vector<NamedTable>& tables, Plate* plate) {
     const auto id = static_cast<std::uint32_t>(row.Integer("positionerId", {0, UINT32_MAX - 1}));
     const bool assigned = row.FlagIfAny("assigned").value_or(false);
     if (row.error()) return;
-    RowsOfRobot& rows = robots.try_emplace(id, RowsOfRobot{.first = row.at(), .assigned = {}}).first->second;
+    RowsOfRobot& rows =
+        robots.try_emplace(id, RowsOfRobot{.first = row.at(), .assigned = {}}).first->second;
     if (assigned && !rows.assigned) rows.assigned = row.at();
   }));
   for (const auto& [id, rows] : robots) {
@@ -182,9 +185,9 @@ Status TakeExposure(const std::vector<NamedTable>& tables, std::int64_t number, 
   FOCALFLEET_TRY_ASSIGN(
       const NamedTable* angles,
       Need(tables, {"positionerID", "startAlpha", "startBeta", "cmdAlpha", "cmdBeta"}, "moves"));
-  FOCALFLEET_TRY_ASSIGN(const NamedTable* measured,
-                        Need(tables, {"positionerID", "xWokMeasMetrology", "yWokMeasMetrology"},
-                             "measured places"));
+  FOCALFLEET_TRY_ASSIGN(
+      const NamedTable* measured,
+      Need(tables, {"positionerID", "xWokMeasMetrology", "yWokMeasMetrology"}, "measured places"));
   FOCALFLEET_TRY_ASSIGN(const Places places, ReadPlaces(*measured));
   const double time_s = TimeOf(*angles);
   return angles->table.ReadRows([&](CsvRow& row) {
@@ -223,9 +226,8 @@ Status TakeMoves(const std::vector<std::string>& files, Plate* plate) {
   const bool timed = std::ranges::none_of(
       exposures, [&](const auto& tables) { return std::isnan(time_of(tables)); });
   if (timed)
-    std::ranges::stable_sort(exposures, [&](const auto& a, const auto& b) {
-      return time_of(a) < time_of(b);
-    });
+    std::ranges::stable_sort(exposures,
+                             [&](const auto& a, const auto& b) { return time_of(a) < time_of(b); });
   std::int64_t number = 0;
   for (const auto& tables : exposures) FOCALFLEET_TRY(TakeExposure(tables, ++number, plate));
   double first_s = std::numeric_limits<double>::infinity();
@@ -241,11 +243,11 @@ Result<Plate> ReadSdss(const SourceFiles& files) {
   Plate plate;
   plate.parked = kFolded;
   FOCALFLEET_TRY_ASSIGN(const auto layout, ReadAll(files.layout));
-  FOCALFLEET_TRY_ASSIGN(const NamedTable* robots,
-                        Need(layout,
-                             {"positionerID", "holeID", "alphaArmLen", "metX", "metY",
-                              "alphaOffset", "betaOffset"},
-                             "the robots"));
+  FOCALFLEET_TRY_ASSIGN(
+      const NamedTable* robots,
+      Need(layout,
+           {"positionerID", "holeID", "alphaArmLen", "metX", "metY", "alphaOffset", "betaOffset"},
+           "the robots"));
   FOCALFLEET_TRY_ASSIGN(const NamedTable* wok,
                         Need(layout, {"holeID", "xWok", "yWok", "ix", "iy"}, "the holes"));
   FOCALFLEET_TRY_ASSIGN(const Holes holes, ReadHoles(*wok));

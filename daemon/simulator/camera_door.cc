@@ -33,7 +33,8 @@ std::optional<std::uint64_t> Asked(const std::string& path) {
 
 Result<CameraDoor> CameraDoor::Open(const Options& options) {
   CameraDoor door(options);
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(options.fiducials_path, "fiducial_id"));
+  FOCALFLEET_TRY_ASSIGN(const std::string text,
+                        ReadTableAsText(options.fiducials_path, "fiducial_id"));
   FOCALFLEET_TRY_ASSIGN(const auto fiducials, ReadFiducials(text, options.fiducials_path));
   for (const Fiducial& fiducial : fiducials)
     door.fiducials_.push_back({.kind = sim::LightKind::kFiducial,

@@ -55,9 +55,8 @@ Result<TrueErrors> CompareWithTargets(const sim::World& world, const Targets& ta
   for (const TargetRow& target : targets.rows) {
     const auto row = world.Find(target.unit);
     if (!row)
-      return Fail(ErrorCode::kInvalid, PlaceIn(targets.source, target.line) +
-                                           ": no unit " + std::to_string(target.unit.value) +
-                                           " in this fleet");
+      return Fail(ErrorCode::kInvalid, PlaceIn(targets.source, target.line) + ": no unit " +
+                                           std::to_string(target.unit.value) + " in this fleet");
     const sim::UnitDescription& unit = world.units()[*row];
     if (!unit.enabled) {
       ++errors.disabled;

@@ -106,7 +106,8 @@ class FitsSourceReader {
     if (rows_ < 0 || rows_ > kFitsRowsMax || (row_bytes == 0 && rows_ > 0))
       return Fail(ErrorCode::kInvalid, name_ + ": table '" + table.name + "' has " +
                                            std::to_string(rows_) + " rows, which cannot be");
-    for (int number = 1; number <= count; ++number) FOCALFLEET_TRY(AddColumns(number, row_bytes, &table));
+    for (int number = 1; number <= count; ++number)
+      FOCALFLEET_TRY(AddColumns(number, row_bytes, &table));
     return table;
   }
 
@@ -130,13 +131,14 @@ class FitsSourceReader {
     }
     FOCALFLEET_TRY_ASSIGN(std::vector<FitsValues> values, Values(form, elements));
     for (std::size_t k = 0; k < values.size(); ++k)
-      table->columns.push_back({values.size() == 1 ? form.name : form.name + "_" + std::to_string(k),
-                                form.unit, std::move(values[k])});
+      table->columns.push_back(
+          {values.size() == 1 ? form.name : form.name + "_" + std::to_string(k), form.unit,
+           std::move(values[k])});
     return {};
   }
 
   static bool IsRead(int type) {
-    constexpr int kTypes[] = {TLOGICAL, TBYTE, TSBYTE,    TSHORT,     TUSHORT, TINT,    TUINT,
+    constexpr int kTypes[] = {TLOGICAL, TBYTE,  TSBYTE,    TSHORT,     TUSHORT, TINT,    TUINT,
                               TLONG,    TULONG, TLONGLONG, TULONGLONG, TFLOAT,  TDOUBLE, TSTRING};
     return std::ranges::find(kTypes, type) != std::end(kTypes);
   }
@@ -144,12 +146,17 @@ class FitsSourceReader {
   /// The values by element. Shape: (elements), each (rows).
   Result<std::vector<FitsValues>> Values(const Form& form, LONGLONG elements) {
     switch (form.type) {
-      case TSTRING: return Texts(form, elements);
+      case TSTRING:
+        return Texts(form, elements);
       case TFLOAT:
-      case TDOUBLE: return Read<double, double>(form, elements, TDOUBLE, std::nan(""));
-      case TLOGICAL: return Read<char, std::int64_t>(form, elements, TLOGICAL, kMissingWhole);
-      case TULONGLONG: return Unsigned(form, elements);
-      default: return Read<LONGLONG, std::int64_t>(form, elements, TLONGLONG, kMissingWhole);
+      case TDOUBLE:
+        return Read<double, double>(form, elements, TDOUBLE, std::nan(""));
+      case TLOGICAL:
+        return Read<char, std::int64_t>(form, elements, TLOGICAL, kMissingWhole);
+      case TULONGLONG:
+        return Unsigned(form, elements);
+      default:
+        return Read<LONGLONG, std::int64_t>(form, elements, TLONGLONG, kMissingWhole);
     }
   }
 

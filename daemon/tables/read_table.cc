@@ -32,10 +32,24 @@ std::string_view WithoutMark(std::string_view text) {
   return text;
 }
 
+/// XML and JSON become trees, which take many times the file's size.
+Status CheckTreeSize(std::string_view bytes, const std::string& path) {
+  constexpr std::size_t kBytesMax = std::size_t{256} << 20;
+  if (bytes.size() <= kBytesMax) return {};
+  return Fail(ErrorCode::kInvalid, fmt::format("{}: larger than {} MiB: write it as CSV or FITS",
+                                               path, kBytesMax >> 20));
+}
+
 /// The tables of a file that is not text in lines; none: it is.
 Result<std::optional<SourceFile>> SourceOfBytes(std::string* bytes, const std::string& path) {
   if (bytes->starts_with("SIMPLE  =")) {
     FOCALFLEET_TRY_ASSIGN(SourceFile file, ReadFitsSource(std::move(*bytes), path));
+    return std::optional(std::move(file));
+  }
+  const char first = FirstLetter(*bytes);
+  if (first == '<') {  // in the encoding that it states
+    FOCALFLEET_TRY(CheckTreeSize(*bytes, path));
+    FOCALFLEET_TRY_ASSIGN(SourceFile file, ReadXmlSource(*bytes, path));
     return std::optional(std::move(file));
   }
   FOCALFLEET_TRY(CheckText(*bytes, path));
@@ -43,12 +57,8 @@ Result<std::optional<SourceFile>> SourceOfBytes(std::string* bytes, const std::s
     FOCALFLEET_TRY_ASSIGN(SourceFile file, ReadYannySource(WithoutMark(*bytes), path));
     return std::optional(std::move(file));
   }
-  const char first = FirstLetter(*bytes);
-  if (first == '<') {
-    FOCALFLEET_TRY_ASSIGN(SourceFile file, ReadXmlSource(*bytes, path));
-    return std::optional(std::move(file));
-  }
   if (first == '{' || first == '[') {
+    FOCALFLEET_TRY(CheckTreeSize(*bytes, path));
     FOCALFLEET_TRY_ASSIGN(SourceFile file, ReadJsonSource(WithoutMark(*bytes), path));
     return std::optional(std::move(file));
   }
@@ -130,8 +140,8 @@ Result<std::vector<NamedTable>> ReadTables(const std::string& path) {
 
 std::string FindTable(const std::string& folder, const std::string& stem) {
   const std::filesystem::path path(folder);
-  constexpr std::string_view kExtensions[] = {".csv",  ".ecsv",    ".fits",   ".csv.gz", ".fits.gz",
-                                              ".json", ".ecsv.gz", ".par",    ".xml",    ".vot"};
+  constexpr std::string_view kExtensions[] = {".csv",  ".ecsv",    ".fits", ".csv.gz", ".fits.gz",
+                                              ".json", ".ecsv.gz", ".par",  ".xml",    ".vot"};
   for (const std::string_view extension : kExtensions) {
     const std::filesystem::path file = path / (stem + std::string(extension));
     std::error_code none;

@@ -1,7 +1,7 @@
 // The one reader of tables. Whatever a command takes as a table may be CSV with its variants
-// (csv.h), ECSV, a FITS binary table, a yanny file, JSON, XML or a VOTable, packed by gzip or not. The
-// format shows in the content; names of files do not count. A table of another format becomes text
-// here, and the readers of targets, units and moves never know.
+// (csv.h), ECSV, a FITS binary table, a yanny file, JSON, XML or a VOTable, packed by gzip or not.
+// The format shows in the content; names of files do not count. A table of another format becomes
+// text here, and the readers of targets, units and moves never know.
 #pragma once
 
 #include <string>

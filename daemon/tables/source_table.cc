@@ -44,7 +44,8 @@ std::string TextOf(const SourceTable& table) {
   for (const FitsColumn& column : table.columns) {
     names.push_back(column.name);
     if (!column.unit.empty())
-      text += "# - {name: " + YamlQuoted(column.name) + ", unit: " + YamlQuoted(column.unit) + "}\n";
+      text +=
+          "# - {name: " + YamlQuoted(column.name) + ", unit: " + YamlQuoted(column.unit) + "}\n";
   }
   constexpr int kNoLine = -1;
   text += "#@ " + std::to_string(table.header_place != 0 ? table.header_place : kNoLine) + "\n";

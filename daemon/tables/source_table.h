@@ -1,6 +1,6 @@
-// SourceTable is a table as another program wrote it, before any reader of this project looks at it.
-// A file may hold several. Each becomes text for CsvTable, which alone decides what a cell means:
-// whatever the format, one reader checks the values and words the refusals.
+// SourceTable is a table as another program wrote it, before any reader of this project looks at
+// it. A file may hold several. Each becomes text for CsvTable, which alone decides what a cell
+// means: whatever the format, one reader checks the values and words the refusals.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ struct SourceTable {
   std::vector<std::pair<std::string, std::string>> keys = {};  // of the header, in its order
   /// Missing values are NaN, kMissingWhole or an empty text.
   std::vector<FitsColumn> columns = {};
-  int header_place = 0;  // line of the header (place.h); 0: the format has none
-  std::vector<int> places = {};              // of each row; empty: rows have no lines
+  int header_place = 0;          // line of the header (place.h); 0: the format has none
+  std::vector<int> places = {};  // of each row; empty: rows have no lines
   std::vector<std::string> passed_over = {};  // columns that hold no single values
 
   [[nodiscard]] std::size_t rows() const;

@@ -76,8 +76,7 @@ class TreeBuilder {
   static void End(void* data, const XML_Char* /*name*/) { Of(data).open_.pop_back(); }
   static void Text(void* data, const XML_Char* text, int size) {
     TreeBuilder& self = Of(data);
-    if (!self.open_.empty())
-      self.open_.back()->text.append(text, static_cast<std::size_t>(size));
+    if (!self.open_.empty()) self.open_.back()->text.append(text, static_cast<std::size_t>(size));
   }
   // Entities of a file can be made to expand without end, and nobody's tables need them.
   static void Entity(void* data, const XML_Char* /*name*/, int /*is_parameter*/,
@@ -205,8 +204,9 @@ Result<SourceFile> ReadXmlSource(const std::string& text, const std::string& nam
         if (child->children.empty()) table.keys.emplace_back(child->name, TrimmedText(child->text));
   }
   if (file.tables.empty())
-    return Fail(ErrorCode::kInvalid, name + ": no table in this XML file: repeated elements are "
-                                            "expected as rows");
+    return Fail(ErrorCode::kInvalid, name +
+                                         ": no table in this XML file: repeated elements are "
+                                         "expected as rows");
   return file;
 }
 

@@ -28,9 +28,8 @@ struct Struct {
 };
 
 bool SameWord(std::string_view a, std::string_view b) {
-  return std::ranges::equal(a, b, [](unsigned char x, unsigned char y) {
-    return std::tolower(x) == std::tolower(y);
-  });
+  return std::ranges::equal(
+      a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
 bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
@@ -133,18 +132,21 @@ class YannyParser {
   Status TakeDefinition(std::string text, int line) {
     while (text.find('}') == std::string::npos ||
            text.find(';', text.rfind('}')) == std::string::npos) {
-      if (at_ >= text_.size()) return FailAt(line, "a definition does not end: the file is cut short");
+      if (at_ >= text_.size())
+        return FailAt(line, "a definition does not end: the file is cut short");
       std::string more = TakeLogicalLine();
       more.resize(std::min(more.find('#'), more.size()));
       text += ' ' + more;
     }
     const std::size_t open = text.find('{');
     const std::size_t close = text.rfind('}');
-    if (open == std::string::npos || open > close) return FailAt(line, "a definition without braces");
+    if (open == std::string::npos || open > close)
+      return FailAt(line, "a definition without braces");
     if (text.substr(0, open).find("struct") == std::string::npos) return {};  // an enum
     Struct made;
     made.line = line;
-    made.name = Trimmed(std::string_view(text).substr(close + 1, text.find(';', close) - close - 1));
+    made.name =
+        Trimmed(std::string_view(text).substr(close + 1, text.find(';', close) - close - 1));
     std::string_view fields = std::string_view(text).substr(open + 1, close - open - 1);
     while (!Trimmed(fields).empty()) {
       const std::size_t end = std::min(fields.find(';'), fields.size());
@@ -158,7 +160,8 @@ class YannyParser {
   /// `short positionerId`, `float mag[5]`, `char holeId[28]` (a text), `char names[3][20]`.
   [[nodiscard]] Status TakeField(std::string_view text, int line, Struct* into) const {
     const std::size_t blank = text.find_first_of(" \t");
-    if (blank == std::string_view::npos) return FailAt(line, "a field without a name: " + Quoted(text));
+    if (blank == std::string_view::npos)
+      return FailAt(line, "a field without a name: " + Quoted(text));
     const bool is_text = SameWord(text.substr(0, blank), "char");
     std::string_view name = Trimmed(text.substr(blank));
     Field field;
@@ -203,8 +206,7 @@ class YannyParser {
     }
     if (words.Next(&word, &braced))
       return FailAt(line, found->name + ": more values than fields, from " + Quoted(word) + " on");
-    for (std::size_t k = 0; k < cells.size(); ++k)
-      found->columns[k].push_back(std::move(cells[k]));
+    for (std::size_t k = 0; k < cells.size(); ++k) found->columns[k].push_back(std::move(cells[k]));
     found->places.push_back(line);
     return {};
   }
@@ -238,8 +240,9 @@ class YannyParser {
       std::size_t column = 0;
       for (const Field& field : each.fields)
         for (std::size_t k = 0; k < field.elements; ++k)
-          table.columns.push_back({field.is_array ? field.name + "_" + std::to_string(k) : field.name,
-                                   "", std::move(each.columns[column++])});
+          table.columns.push_back(
+              {field.is_array ? field.name + "_" + std::to_string(k) : field.name, "",
+               std::move(each.columns[column++])});
       table.places = std::move(each.places);
       file.tables.push_back(std::move(table));
     }
@@ -262,8 +265,9 @@ bool IsYanny(std::string_view text) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     std::string_view line = Trimmed(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
-    if (line.starts_with("typedef")) return line.find("struct") != std::string_view::npos ||
-                                            line.find("enum") != std::string_view::npos;
+    if (line.starts_with("typedef"))
+      return line.find("struct") != std::string_view::npos ||
+             line.find("enum") != std::string_view::npos;
     const bool may_go_on = line.empty() || line.front() == '#' || line == "\r";
     if (!may_go_on) return false;
   }

@@ -11,7 +11,17 @@
 namespace focalfleet {
 namespace {
 
-enum class Kind : std::uint8_t { kLength, kAngle, kTime, kVolt, kAmpere, kWatt, kJoule, kPixel, kHeat };
+enum class Kind : std::uint8_t {
+  kLength,
+  kAngle,
+  kTime,
+  kVolt,
+  kAmpere,
+  kWatt,
+  kJoule,
+  kPixel,
+  kHeat
+};
 
 struct KnownUnit {
   std::string_view name;

@@ -231,6 +231,8 @@ class CsvParser {
 
   void TakeRow(int line, std::vector<std::string> cells) {
     const std::size_t width = table_.columns_.size();
+    // Separators behind the last cell, as spreadsheets leave them.
+    while (cells.size() > width && cells.back().empty()) cells.pop_back();
     if (cells.size() != width) {
       const char* kind = cells.size() < width ? "too few cells" : "too many cells";
       of_another_width_.Add(
@@ -301,8 +303,7 @@ std::vector<std::string> CsvTable::Others(std::initializer_list<std::string_view
 }
 
 Error CsvTable::ErrorAt(std::size_t row, std::string_view reason) const {
-  return {ErrorCode::kInvalid,
-          PlaceIn(file_, line(row)) + ": " + std::string(reason)};
+  return {ErrorCode::kInvalid, PlaceIn(file_, line(row)) + ": " + std::string(reason)};
 }
 
 }  // namespace focalfleet

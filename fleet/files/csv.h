@@ -7,8 +7,8 @@
 // Without a comma in the header cells are separated by semicolons (numbers then may have a decimal
 // comma), else by tabs, else by blanks.
 //
-// Tables of other formats come as ECSV with a comment `#@ N` before each row: N is the row's line in
-// the file that the text was made from, or the negative number of the row (place.h).
+// Tables of other formats come as ECSV with a comment `#@ N` before each row: N is the row's line
+// in the file that the text was made from, or the negative number of the row (place.h).
 //
 // Columns without a name (the index of pandas, the last commas of spreadsheets) are skipped, as are
 // columns that a reader does not know.
@@ -49,7 +49,8 @@ class CsvTable {
   /// The names as they stand in the header.
   [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
   /// The name by which Find knows a column: a name in capitals alone, as FITS has them, is known in
-  /// small letters (`unit_id` for UNIT_ID, `v_bus_V` for V_BUS_V) unless another column is called so.
+  /// small letters (`unit_id` for UNIT_ID, `v_bus_V` for V_BUS_V) unless another column is called
+  /// so.
   [[nodiscard]] const std::string& known_as(std::size_t column) const { return known_as_[column]; }
   /// A column as messages call it; "column 1 (no name)" where it has none.
   [[nodiscard]] std::string Shown(std::size_t column) const;

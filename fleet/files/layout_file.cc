@@ -66,8 +66,7 @@ std::string LinePrefix(const UnitsFile& file, std::string_view text) {
   if (std::from_chars(text.data(), text.data() + text.size(), id).ec != std::errc())
     return file.source + ": ";
   for (std::size_t i = 0; i < file.units.size(); ++i)
-    if (file.units[i].id.value == id)
-      return PlaceIn(file.source, file.lines[i]) + ": ";
+    if (file.units[i].id.value == id) return PlaceIn(file.source, file.lines[i]) + ": ";
   return file.source + ": ";
 }
 

@@ -145,9 +145,9 @@ Result<Exposure> ReadSpots(std::string_view text, std::string file, const Sensor
     const Spot spot = ReadSpot(&row, sensor);
     if (row.error()) return;
     if (const auto [it, fresh] = line_of.emplace(spot.id, row.line()); !fresh)
-      return row.RejectRow("spot " + std::to_string(spot.id) + ": is there twice, first in " +
-                               LineOrRow(it->second),
-                           "is there twice");
+      return row.RejectRow(
+          "spot " + std::to_string(spot.id) + ": is there twice, first in " + LineOrRow(it->second),
+          "is there twice");
     exposure.spots.push_back(spot);
   }));
   if (const auto checked = CheckSpots(exposure, sensor); !checked)

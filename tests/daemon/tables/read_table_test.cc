@@ -31,13 +31,13 @@ TEST_F(ReadTableTest, TextInLinesStaysAsItIs) {
 
 TEST_F(ReadTableTest, AFitsTableHasRowsUnitsVectorsAndMissingValues) {
   const std::string path = scratch_ / "t.fits";
-  ASSERT_TRUE(WriteFitsTable(
-      path, {.name = "T",
-             .keys = {{"EXPID", std::int64_t{7}, ""}},
-             .columns = {{"UNIT_ID", "", std::vector<std::int64_t>{1, 2}},
-                         {"X_MM", "m", std::vector<double>{0.5, std::nan("")}},
-                         {"pair", "", std::vector<double>{1, 2, 3, 4}, 2},
-                         {"NAME", "", std::vector<std::string>{"a, \"b\"", ""}}}}));
+  ASSERT_TRUE(
+      WriteFitsTable(path, {.name = "T",
+                            .keys = {{"EXPID", std::int64_t{7}, ""}},
+                            .columns = {{"UNIT_ID", "", std::vector<std::int64_t>{1, 2}},
+                                        {"X_MM", "m", std::vector<double>{0.5, std::nan("")}},
+                                        {"pair", "", std::vector<double>{1, 2, 3, 4}, 2},
+                                        {"NAME", "", std::vector<std::string>{"a, \"b\"", ""}}}}));
   const auto tables = ReadTables(path);
   ASSERT_TRUE(tables) << tables.error().text;
   const NamedTable& table = tables->front();

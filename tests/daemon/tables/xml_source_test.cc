@@ -37,8 +37,7 @@ TEST(XmlSource, RepeatedElementsAreRowsAndWhatStandsBelowAreCells) {
 }
 
 TEST(XmlSource, ASingleElementIsARow) {
-  const auto file =
-      ReadXmlSource("<R><ROW><H><Id>1</Id></H><B><x>2</x></B></ROW></R>", "a.xml");
+  const auto file = ReadXmlSource("<R><ROW><H><Id>1</Id></H><B><x>2</x></B></ROW></R>", "a.xml");
   ASSERT_TRUE(file);
   ASSERT_EQ(file->tables.size(), 1u);
   EXPECT_EQ(file->tables[0].columns.size(), 2u);
@@ -46,7 +45,8 @@ TEST(XmlSource, ASingleElementIsARow) {
 
 TEST(XmlSource, VoTablesHaveUnits) {
   const auto file = ReadXmlSource(
-      "<VOTABLE><RESOURCE><TABLE name=\"t\">\n<FIELD name=\"x_mm\" unit=\"m\"/><FIELD name=\"n\"/>\n"
+      "<VOTABLE><RESOURCE><TABLE name=\"t\">\n<FIELD name=\"x_mm\" unit=\"m\"/><FIELD "
+      "name=\"n\"/>\n"
       "<DATA><TABLEDATA>\n<TR><TD>0.5</TD><TD>a</TD></TR>\n</TABLEDATA></DATA></TABLE></RESOURCE>"
       "</VOTABLE>",
       "a.vot");

@@ -50,7 +50,8 @@ TEST(YannySource, ReadsStructsKeysArraysAndQuotes) {
 }
 
 TEST(YannySource, RefusesRowsThatDoNotFitWithTheirLine) {
-  EXPECT_EQ(ErrorOf("FIBERMAP 1 a A {1 2}\n"), "a.par:14: FIBERMAP: the row ends before field words");
+  EXPECT_EQ(ErrorOf("FIBERMAP 1 a A {1 2}\n"),
+            "a.par:14: FIBERMAP: the row ends before field words");
   EXPECT_EQ(ErrorOf("FIBERMAP 1 a A {1 2} {x y} 7\n"),
             "a.par:14: FIBERMAP: more values than fields, from '7' on");
   EXPECT_EQ(ErrorOf("FIBERMAP 1 a A {1 2 3} {x y}\n"), "a.par:14: field mag: more than 2 elements");

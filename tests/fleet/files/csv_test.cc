@@ -100,6 +100,14 @@ TEST(Csv, SemicolonsTabsAndBlanksSeparateCellsWhereNoCommaDoes) {
   EXPECT_EQ(CsvRow(Parsed("a\rb\r"), 0).Text("a"), "b") << "lines of an old Macintosh";
 }
 
+TEST(Csv, EmptyCellsBehindTheLastColumnArePassedOver) {
+  const CsvTable table = Parsed("a,b\n1,2,,\n3,,\n");
+  ASSERT_EQ(table.size(), 2u);
+  EXPECT_EQ(CsvRow(table, 0).Number("b"), 2);
+  EXPECT_FALSE(CsvRow(table, 1).Has("b"));
+  EXPECT_EQ(ErrorOf("a,b\n1,2,,3\n"), "a.csv:2: 4 cells, but the header has 2 columns");
+}
+
 TEST(Csv, NumbersOfFortranAndWordsForMissingOnesAreKnown) {
   const CsvTable table = Parsed("a,b,c,d,e\n1.5D+03,-2d-1,1D,D5,1.5E+03\nNULL,n/a,--,None,<NA>\n");
   CsvRow row(table, 0);
