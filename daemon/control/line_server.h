@@ -12,6 +12,8 @@
 //   - Where all places are taken, a newcomer gets the place of the client that was idle longest.
 //   - Where none is idle, a newcomer gets a reserved place, where only urgent lines are handled.
 //   - Each reserved place keeps a descriptor of its own, for when the process has none left.
+//
+// A newcomer without a role (`Options::role_of`) is refused before it gets a place.
 #pragma once
 
 #include <chrono>
@@ -23,6 +25,7 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/access/caller.h"
 #include "daemon/control/messages.h"
 #include "protocol/base/limits.h"
 #include "protocol/base/result.h"
@@ -38,8 +41,7 @@ struct IncomingLine {
   std::string text;        // without its newline
   bool overtaken = false;  // an urgent line that came later was handed out before it
   bool reserved = false;   // its client has a reserved place: only urgent lines are to be handled
-  /// The user of the client's process when it connected; none: not known.
-  std::optional<std::uint32_t> user = {};
+  Caller caller = {};     // user and role of the client's process when it connected
 };
 
 class LineServer {
@@ -61,6 +63,12 @@ class LineServer {
     /// 1600 short requests. With half of it, a stop behind more than 800 requests waits for some
     /// answers. Twice as much costs twice the memory, 4 MiB for all clients.
     std::size_t ahead_bytes = std::size_t{64} << 10;
+    /// The role of a newcomer. Without this function everybody may do everything.
+    std::function<Role(const std::optional<Peer>&)> role_of = {};
+    /// Receives each newcomer that was refused for want of a role.
+    std::function<void(const Caller&)> turned_away = {};
+    /// The rights of the socket's file: owner and group by default.
+    std::uint32_t file_mode = 0660;
     /// The pause in accepting after an accept that found no descriptor at all.
     std::chrono::milliseconds accept_pause{1000};
   };

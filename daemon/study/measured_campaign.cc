@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "daemon/campaign/campaign_files.h"
-#include "daemon/campaign/sha256.h"
+#include "daemon/access/sha256.h"
 #include "daemon/files/text_file.h"
 
 namespace focalfleet::cli {
