@@ -28,6 +28,9 @@ enum class AlarmName : std::uint8_t {
   kDdsBack,
   kMetricsMissing,
   kMetricsBack,
+  kDdsCredentialsEnding,
+  kDdsCredentialsEnded,
+  kDdsCredentialsRenewed,
   // buses
   kBusDown,
   kBusPassive,

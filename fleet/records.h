@@ -237,6 +237,36 @@ struct MuteRow {
   bool operator==(const MuteRow&) const = default;
 };
 
+/// A command or a refusal, as it is kept for years: the caller, the request and the answer. The
+/// store numbers and dates it, and chains it to the one before.
+struct AuditRow {
+  static constexpr std::size_t kRequestBytesMax = 4096;
+  static constexpr std::size_t kReasonBytesMax = 1024;
+  /// The process at the control socket.
+  struct Process {
+    std::uint32_t pid = 0;
+    std::uint32_t uid = 0;
+    std::uint32_t gid = 0;
+    std::string program = {};
+    bool operator==(const Process&) const = default;
+  };
+  std::string door;     // socket, http
+  std::string name;     // uid 1000, token NAME
+  std::string role;
+  std::optional<Process> process = {};
+  std::string address = {};  // of HTTP
+  std::string boot_id = {};
+  std::string verb;
+  std::string request = {};         // as it came, at most kRequestBytesMax of it
+  std::string request_sha256 = {};  // of all of it, in hex
+  std::uint64_t request_bytes = 0;  // of all of it
+  bool taken = false;               // false: refused
+  std::string code = {};            // of the error, where it was refused
+  std::string reason = {};          // likewise, or a remark
+  std::uint64_t configuration = 0;  // that was under way then; 0: none, or it is none's affair
+  bool operator==(const AuditRow&) const = default;
+};
+
 /// The next move id to give out; written with the first intent that uses one.
 struct NextMoveRow {
   MoveId next;
@@ -257,7 +287,7 @@ struct ModelRow {
 
 using Row = std::variant<VectorRow, MeasurementRow, IntentRow, IntentEndRow, BindingRow, EnableRow,
                          ParameterRow, TuningRow, ConfigurationRow, AlarmRow, AlarmEndRow,
-                         OpenAlarmRow, MuteRow, NextMoveRow, ModelRow>;
+                         OpenAlarmRow, MuteRow, NextMoveRow, ModelRow, AuditRow>;
 
 /// A row that the store can never keep. The row was set aside, and the rest of its batch was kept.
 struct RefusedRow {

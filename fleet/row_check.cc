@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "protocol/base/limits.h"
+
 namespace focalfleet {
 namespace {
 
@@ -105,6 +107,11 @@ struct FlawOf {
                ? "its entry, or the one that it restores, does not exist"
                : nullptr;
   }
+  const char* operator()(const AuditRow& row) const {
+    return row.verb.size() > limits::kVerbBytes || row.request.size() > AuditRow::kRequestBytesMax
+               ? "its verb or request is too long"
+               : nullptr;
+  }
 };
 
 std::string OfSerial(const char* what, SerialNumber serial) {
@@ -149,6 +156,7 @@ struct DescriptionOf {
   std::string operator()(const ModelRow& row) const {
     return "model change " + std::to_string(row.entry);
   }
+  std::string operator()(const AuditRow& row) const { return "audit of " + row.verb; }
 };
 
 }  // namespace

@@ -43,7 +43,7 @@ class CameraDds::Impl {
     auto impl = std::make_unique<Impl>();
     impl->sensor_ = sensor;
     FOCALFLEET_TRY_ASSIGN(impl->domain_, Domain::Acquire(dds.domain, dds.config_xml));
-    FOCALFLEET_TRY_ASSIGN(impl->participant_, MakeParticipant(dds.domain));
+    FOCALFLEET_TRY_ASSIGN(impl->participant_, MakeParticipant(dds.domain, dds.security));
     FOCALFLEET_TRY_ASSIGN(
         const Handle request,
         MakeTopic(impl->participant_, focalfleet_ExposureRequest_desc, kExposureRequestTopic));

@@ -39,6 +39,7 @@ const std::vector<Group>& Groups() {
        {"status", "doctor", "unit", "state", "alarms", "events", "history", "watch",
         "measurements"}},
       {"Maintain units", {"disable", "enable", "adopt", "params"}},
+      {"Access", {"access", "audit", "token"}},
       {"Study and tune",
        {"campaign", "diagnose", "model", "simulate", "tune", "reproduce", "hall"}},
   };
@@ -207,6 +208,7 @@ std::unique_ptr<CommandLine> MakeCommandLine(AddStudy add_study) {
   AddCampaignCommands(line.get());
   AddModelCommands(line.get());
   AddStoreCommands(line.get());
+  AddAccessCommands(line.get());
   AddCanCommands(line.get());
   AddDoctorCommand(line.get());
   AddCompletionCommand(line.get());

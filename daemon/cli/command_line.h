@@ -80,6 +80,7 @@ void AddCanCommands(CommandLine* line);
 void AddMeasurementsCommand(CommandLine* line);
 void AddModelCommands(CommandLine* line);
 void AddStoreCommands(CommandLine* line);
+void AddAccessCommands(CommandLine* line);  // access, audit, token
 void AddDoctorCommand(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 void AddHelpCommand(CommandLine* line);

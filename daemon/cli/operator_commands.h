@@ -1,4 +1,5 @@
-// Functions that add the commands about alarms, events and the configuration under way.
+// Functions that add the commands about alarms, events, the configuration under way, the audit and
+// tokens.
 #pragma once
 
 #include "daemon/cli/command_line.h"
@@ -8,5 +9,7 @@ namespace focalfleet::cli {
 void AddAlarmCommands(CommandLine* line);  // alarms, alarms ack, mute, unmute
 void AddEventsCommand(CommandLine* line);
 void AddWaitCommand(CommandLine* line);
+void AddAuditCommand(CommandLine* line);
+void AddTokenCommands(CommandLine* line);  // token add, list, revoke
 
 }  // namespace focalfleet::cli

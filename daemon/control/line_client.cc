@@ -129,7 +129,9 @@ Result<Json> LineClient::Call(const std::string& verb, const Json& args,
                               const CallOptions& options) {
   if (!connected()) return Fail(ErrorCode::kUnavailable, path_ + ": not connected");
   const std::uint64_t id = next_id_++;
-  FOCALFLEET_TRY(SendAll(EncodeRequest({id, verb, args}) + "\n", options));
+  FOCALFLEET_TRY(SendAll(
+      EncodeRequest({.id = id, .verb = verb, .args = args, .caller = options.caller}) + "\n",
+      options));
   for (;;) {
     FOCALFLEET_TRY_ASSIGN(const std::string line, NextLine(options));
     auto answer = DecodeAnswer(line);

@@ -18,6 +18,8 @@ class LineClient {
   struct CallOptions {
     std::optional<DurationNs> silence_max = Seconds(10);  // none: wait for ever
     std::function<void(const Json&)> on_progress;         // may be empty
+    /// On whose behalf it is asked, where this process is the daemon (http/ does it).
+    std::optional<Caller> caller = {};
   };
 
   /// The client is connected. Errors: kUnavailable, names the path: no server listens there, the

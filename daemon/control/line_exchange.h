@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/access/caller.h"
+
 namespace focalfleet {
 
 /// A server never gives an id twice, so an answer cannot reach another client than the one that
@@ -19,8 +21,7 @@ struct IncomingLine {
   std::string text;        // without its newline
   bool overtaken = false;  // an urgent line that came later was handed out before it
   bool reserved = false;   // its client has a reserved place: only urgent lines are to be handled
-  /// The user of the client's process when it connected; none: not known.
-  std::optional<std::uint32_t> user = {};
+  Caller caller = {};      // user and role of the client's process when it connected
 };
 
 class LineExchange {

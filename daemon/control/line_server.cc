@@ -31,13 +31,6 @@ constexpr std::uint64_t kResume = kAgain - 1;
 constexpr int kAcceptsPerTurn = 16;
 
 bool NoDescriptor(int error) { return error == EMFILE || error == ENFILE; }
-std::optional<std::uint32_t> UserOf(int fd) {
-  ucred peer{};
-  socklen_t length = sizeof peer;
-  if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &length) != 0) return std::nullopt;
-  return peer.uid;
-}
-
 bool NoRoom(int error) { return NoDescriptor(error) || error == ENOBUFS || error == ENOMEM; }
 
 }  // namespace
@@ -67,7 +60,8 @@ class LineServer::Impl {
 
   void Accept();
   bool AcceptOne();
-  void Admit(int fd, bool reserved);
+  void Admit(int fd, Caller caller, bool reserved);
+  bool TurnAway(int fd, const Caller& caller) const;
   bool DropIdlest(bool reserved);
   void PauseAccepting();
   void ResumeAccepting();
@@ -139,21 +133,35 @@ bool LineServer::Impl::AcceptOne() {
     if (NoRoom(errno)) PauseAccepting();
     return false;
   }
+  Caller caller{.peer = PeerOf(fd)};
+  caller.role = options_.role_of ? options_.role_of(caller.peer) : Role::kEngineer;
+  if (TurnAway(fd, caller)) return true;
   if (!spared && (Taken(false) < options_.clients_max || DropIdlest(false)))
-    Admit(fd, false);
+    Admit(fd, std::move(caller), false);
   else if (Taken(true) < options_.reserved_max || DropIdlest(true))
-    Admit(fd, true);
+    Admit(fd, std::move(caller), true);
   else
-    ReportAndClose(fd, "too many clients at " + path() + ", and none of them is idle");
+    ReportAndClose(fd, ErrorCode::kFull, "too many clients at " + path() + ", and none of them is idle");
   return true;
 }
 
-void LineServer::Impl::Admit(int fd, bool reserved) {
+/// True: the newcomer has no role, and is gone.
+bool LineServer::Impl::TurnAway(int fd, const Caller& caller) const {
+  if (caller.role != Role::kNone) return false;
+  ReportAndClose(fd, ErrorCode::kRefused,
+                 NameOf(caller) + " has no role here: " + path() +
+                     " answers members of the groups that control.viewers, control.operators and "
+                     "control.engineers name");
+  if (options_.turned_away) options_.turned_away(caller);
+  return true;
+}
+
+void LineServer::Impl::Admit(int fd, Caller caller, bool reserved) {
   const ClientId id = next_++;
   Client& client = clients_[id];
   client.fd = fd;
   client.reserved = reserved;
-  client.user = UserOf(fd);
+  client.caller = std::move(caller);
   client.active = ++active_;
   client.watched = EPOLLIN;
   reserved_ += reserved ? 1u : 0u;
@@ -172,7 +180,7 @@ bool LineServer::Impl::DropIdlest(bool reserved) {
   if (idlest == clients_.end()) return false;
   // In the middle of an answer the reason is not sent: it would be part of the answer.
   if (idlest->second.waiting() == 0)
-    ReportAndClose(std::exchange(idlest->second.fd, -1),
+    ReportAndClose(std::exchange(idlest->second.fd, -1), ErrorCode::kFull,
                    "too many clients at " + path() + ": this one was idle longest");
   Drop(idlest->first);
   return true;
@@ -245,8 +253,10 @@ void LineServer::Impl::TakeUrgent(std::vector<IncomingLine>* urgent) {
     if (!line) continue;
     ++client.open;
     client.active = ++active_;
-    urgent->push_back(
-        {.client = id, .text = std::move(*line), .reserved = client.reserved, .user = client.user});
+    urgent->push_back({.client = id,
+                       .text = std::move(*line),
+                       .reserved = client.reserved,
+                       .caller = client.caller});
   }
   const auto taken = std::span(*urgent).subspan(before);
   for (auto& [id, client] : clients_)
@@ -298,7 +308,7 @@ std::optional<IncomingLine> LineServer::Impl::Next() {
       ++client.open;
       client.active = ++active_;
       turn_ = id;
-      next = {id, std::move(line->text), line->overtaken, client.reserved, client.user};
+      next = {id, std::move(line->text), line->overtaken, client.reserved, client.caller};
     }
     if (!Settle(id, &client)) Drop(id);
   }
@@ -338,7 +348,7 @@ LineServer& LineServer::operator=(LineServer&&) noexcept = default;
 LineServer::~LineServer() = default;
 
 Result<LineServer> LineServer::Create(const std::string& path, const Options& options) {
-  FOCALFLEET_TRY_ASSIGN(ListeningSocket listener, ListeningSocket::Create(path));
+  FOCALFLEET_TRY_ASSIGN(ListeningSocket listener, ListeningSocket::Create(path, options.file_mode));
   auto impl = std::make_unique<Impl>(std::move(listener), options);
   FOCALFLEET_TRY(impl->Open());
   return LineServer(std::move(impl));

@@ -12,6 +12,8 @@
 //   - Where all places are taken, a newcomer gets the place of the client that was idle longest.
 //   - Where none is idle, a newcomer gets a reserved place, where only urgent lines are handled.
 //   - Each reserved place keeps a descriptor of its own, for when the process has none left.
+//
+// A newcomer without a role (`Options::role_of`) is refused before it gets a place.
 #pragma once
 
 #include <chrono>
@@ -49,6 +51,12 @@ class LineServer final : public LineExchange {
     /// 1600 short requests. With half of it, a stop behind more than 800 requests waits for some
     /// answers. Twice as much costs twice the memory, 4 MiB for all clients.
     std::size_t ahead_bytes = std::size_t{64} << 10;
+    /// The role of a newcomer. Without this function everybody may do everything.
+    std::function<Role(const std::optional<Peer>&)> role_of = {};
+    /// Receives each newcomer that was refused for want of a role.
+    std::function<void(const Caller&)> turned_away = {};
+    /// The rights of the socket's file: owner and group by default.
+    std::uint32_t file_mode = 0660;
     /// The pause in accepting after an accept that found no descriptor at all.
     std::chrono::milliseconds accept_pause{1000};
   };

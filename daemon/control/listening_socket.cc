@@ -39,13 +39,13 @@ Status CheckFree(const std::string& path, const UnixAddress& address) {
 
 }  // namespace
 
-Result<ListeningSocket> ListeningSocket::Create(const std::string& path) {
+Result<ListeningSocket> ListeningSocket::Create(const std::string& path, std::uint32_t mode) {
   FOCALFLEET_TRY_ASSIGN(const UnixAddress address, UnixAddress::Of(path));
   const std::string temporary_path = path + ".new";
   FOCALFLEET_TRY_ASSIGN(const UnixAddress temporary, UnixAddress::Of(temporary_path));
   FOCALFLEET_TRY(CheckFree(path, address));
   ListeningSocket listener(path);
-  FOCALFLEET_TRY(listener.Listen(temporary, temporary_path));
+  FOCALFLEET_TRY(listener.Listen(temporary, temporary_path, mode));
   return listener;
 }
 
@@ -75,7 +75,8 @@ int ListeningSocket::Accept() const {
   return ::accept4(fd_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
 }
 
-Status ListeningSocket::Listen(const UnixAddress& temporary, const std::string& temporary_path) {
+Status ListeningSocket::Listen(const UnixAddress& temporary, const std::string& temporary_path,
+                               std::uint32_t mode) {
   const auto failed = [&] {
     return Fail(ErrorCode::kUnavailable, "cannot listen at " + path_ + ": " + Reason());
   };
@@ -84,7 +85,7 @@ Status ListeningSocket::Listen(const UnixAddress& temporary, const std::string& 
   ::unlink(temporary_path.c_str());
   if (::bind(fd_, temporary.get(), temporary.length()) != 0) return failed();
   struct stat info {};
-  if (::chmod(temporary_path.c_str(), 0660) != 0 || ::listen(fd_, SOMAXCONN) != 0 ||
+  if (::chmod(temporary_path.c_str(), mode) != 0 || ::listen(fd_, SOMAXCONN) != 0 ||
       ::stat(temporary_path.c_str(), &info) != 0 ||
       ::rename(temporary_path.c_str(), path_.c_str()) != 0) {
     auto error = failed();

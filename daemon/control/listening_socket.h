@@ -1,6 +1,6 @@
 // A UNIX stream socket that listens at a path.
 //
-// Owner and group may connect (mode 0660). A socket file that a live server answers on is refused
+// Owner and group may connect, unless another mode is given. A socket file that a live server answers on is refused
 // as in use. A file that no process answers on was left by a crash and is replaced. The new socket
 // listens under a temporary name and is renamed into place, so no client ever finds a socket file
 // that does not answer.
@@ -8,6 +8,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <string>
 #include <utility>
 
@@ -20,7 +21,7 @@ class ListeningSocket {
  public:
   /// Errors: kRefused where a live server answers at `path`; kUnavailable where the path is no
   /// socket, too long or not writable; both name it.
-  static Result<ListeningSocket> Create(const std::string& path);
+  static Result<ListeningSocket> Create(const std::string& path, std::uint32_t mode = 0660);
   ListeningSocket(ListeningSocket&& other) noexcept;
   ListeningSocket& operator=(ListeningSocket&& other) noexcept;
   ListeningSocket(const ListeningSocket&) = delete;
@@ -37,7 +38,8 @@ class ListeningSocket {
 
  private:
   explicit ListeningSocket(std::string path) : path_(std::move(path)) {}
-  Status Listen(const UnixAddress& temporary, const std::string& temporary_path);
+  Status Listen(const UnixAddress& temporary, const std::string& temporary_path,
+                std::uint32_t mode);
 
   std::string path_;
   int fd_ = -1;

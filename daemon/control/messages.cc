@@ -76,6 +76,20 @@ Result<Json> ParseObject(std::string_view line, std::size_t values_max) {
   return json;
 }
 
+/// {token, role, address}, all of them texts.
+Result<Caller> CallerOf(const Json& object) {
+  const auto text = [&](const char* name) {
+    const Json* const value = object.is_object() ? Member(object, name) : nullptr;
+    const bool fits = value != nullptr && value->is_string() &&
+                      value->get_ref<const std::string&>().size() <= limits::kTextBytes;
+    return fits ? value->get<std::string>() : std::string();
+  };
+  const auto role = RoleOf(text("role"));
+  if (!role || text("token").empty()) return Malformed("'caller' must name a token and its role");
+  return Caller{
+      .role = *role, .door = Door::kHttp, .token = text("token"), .address = text("address")};
+}
+
 Result<std::uint64_t> IdOf(const Json& object) {
   const Json* id = Member(object, "id");
   const auto number = id == nullptr ? std::nullopt : UnsignedOf(*id);
@@ -99,6 +113,10 @@ ErrorCode CodeOf(std::string_view name) {
   return ErrorCode::kUnavailable;
 }
 
+Result<Json> DecodeObject(std::string_view text) {
+  return ParseObject(text, limits::kControlValues);
+}
+
 Result<ControlRequest> DecodeRequest(std::string_view line) {
   FOCALFLEET_TRY_ASSIGN(Json json, ParseObject(line, limits::kControlValues));
   ControlRequest request;
@@ -111,6 +129,9 @@ Result<ControlRequest> DecodeRequest(std::string_view line) {
   if (const auto args = json.find("args"); args != json.end()) {
     if (!args->is_object()) return Malformed("'args' must be an object");
     request.args = std::move(*args);
+  }
+  if (const Json* const caller = Member(json, "caller")) {
+    FOCALFLEET_TRY_ASSIGN(request.caller, CallerOf(*caller));
   }
   return request;
 }
@@ -145,7 +166,12 @@ Result<ControlAnswer> DecodeAnswer(std::string_view line) {
 }
 
 std::string EncodeRequest(const ControlRequest& request) {
-  return Dump({{"id", request.id}, {"verb", request.verb}, {"args", request.args}});
+  Json object{{"id", request.id}, {"verb", request.verb}, {"args", request.args}};
+  if (request.caller)
+    object["caller"] = {{"token", request.caller->token},
+                        {"role", Name(request.caller->role)},
+                        {"address", request.caller->address}};
+  return Dump(object);
 }
 
 std::string EncodeProgress(std::uint64_t id, const Json& progress) {

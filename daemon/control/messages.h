@@ -1,6 +1,7 @@
 // The messages of a control socket: one JSON object a line.
 //
 //   request   {"id":1,"verb":"apply","args":{...}}
+//             {"id":1,"verb":"apply","args":{...},"caller":{...}}        from the daemon's own HTTP
 //   answers   {"id":1,"progress":{...}}                                  any number, may be lost
 //             {"id":1,"ok":true,"result":{...}}                          the last one, or
 //             {"id":1,"ok":false,"error":{"code":"refused","text":"..."}}
@@ -12,10 +13,12 @@
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "daemon/access/caller.h"
 #include "protocol/base/limits.h"
 #include "protocol/base/result.h"
 
@@ -34,6 +37,8 @@ struct ControlRequest {
   std::uint64_t id = 0;
   std::string verb;
   Json args = Json::object();
+  /// The caller on whose behalf another door of the daemon asks; none: the client itself asks.
+  std::optional<Caller> caller = {};
 };
 
 struct ControlAnswer {
@@ -48,6 +53,8 @@ const char* CodeName(ErrorCode code);
 /// The code of a name. An unknown name is kUnavailable: the peer failed in an unknown way.
 ErrorCode CodeOf(std::string_view name);
 
+/// The object of a text, within the limits of a request. Errors: kInvalid.
+Result<Json> DecodeObject(std::string_view text);
 /// The request of a line. Errors: kInvalid; the answer then goes out with id 0, as no id is known.
 Result<ControlRequest> DecodeRequest(std::string_view line);
 /// The answer of a line. Errors: kInvalid.

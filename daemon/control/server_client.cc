@@ -55,8 +55,8 @@ bool ServerClient::CheckLength(std::size_t bytes_max) {
   return false;
 }
 
-void ReportAndClose(int fd, const std::string& why) {
-  const std::string text = EncodeError(0, {ErrorCode::kFull, why}) + "\n";
+void ReportAndClose(int fd, ErrorCode code, const std::string& why) {
+  const std::string text = EncodeError(0, {code, why}) + "\n";
   [[maybe_unused]] const ssize_t reported = ::send(fd, text.data(), text.size(), MSG_NOSIGNAL);
   ::close(fd);
 }

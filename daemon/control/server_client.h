@@ -4,17 +4,18 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 
+#include "daemon/access/caller.h"
 #include "daemon/control/line_buffer.h"
+#include "protocol/base/result.h"
 
 namespace focalfleet {
 
 struct ServerClient {
   int fd = -1;
   bool reserved = false;                   // its place is one of the reserved ones
-  std::optional<std::uint32_t> user = {};  // of its process
+  Caller caller = {};                      // user and role of its process
   std::uint64_t active = 0;  // the server's count when it was last accepted, heard or answered
   LineBuffer input;
   std::string output;
@@ -50,6 +51,6 @@ struct ServerClient {
 
 /// The connection is closed; before, its client receives `why` in one line, if that goes without
 /// waiting.
-void ReportAndClose(int fd, const std::string& why);
+void ReportAndClose(int fd, ErrorCode code, const std::string& why);
 
 }  // namespace focalfleet

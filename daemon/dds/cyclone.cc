@@ -1,11 +1,16 @@
 #include "daemon/dds/cyclone.h"
 
 #include <dds/dds.h>
+#include <dds/ddsrt/log.h>
 
+#include <chrono>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <mutex>
 
+#include "daemon/access/log_limit.h"
+#include "daemon/dds/credentials.h"
 #include "daemon/dds/loopback_config.h"
 
 namespace focalfleet::dds_internal {
@@ -45,6 +50,18 @@ std::unique_ptr<dds_qos_t, DeleteQos> SharedQos() {
   return qos;
 }
 
+/// Each refused participant would cause two lines a second on stderr: strangers could fill a disk.
+void WriteLogLine(void* /*unused*/, const dds_log_data_t* line) {
+  static std::mutex mutex;
+  static LogLimit limit(30);
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  std::string text(line->message, line->size);
+  while (text.ends_with('\n')) text.pop_back();
+  const std::lock_guard lock(mutex);
+  text = limit.Admit({std::chrono::nanoseconds(now).count()}, text);
+  if (!text.empty()) std::fprintf(stderr, "%s\n", text.c_str());
+}
+
 }  // namespace
 
 Entity::~Entity() {
@@ -61,6 +78,7 @@ Result<Domain> Domain::Acquire(std::uint32_t id, const std::string& config_xml) 
   const std::lock_guard lock(domains.mutex);
   Held& held = domains.held[id];
   if (held.users == 0) {
+    dds_set_log_sink(&WriteLogLine, nullptr);
     const char* xml = config_xml.empty() ? kLoopbackConfig : config_xml.c_str();
     held.entity = dds_create_domain(id, xml);
     if (held.entity < 0)
@@ -82,8 +100,14 @@ Domain::~Domain() {
   if (--held.users == 0 && held.entity > 0) dds_delete(std::exchange(held.entity, 0));
 }
 
-Result<Entity> MakeParticipant(std::uint32_t domain) {
-  const dds_entity_t participant = dds_create_participant(domain, nullptr, nullptr);
+Result<Entity> MakeParticipant(std::uint32_t domain, const std::string& security) {
+  std::unique_ptr<dds_qos_t, DeleteQos> qos;
+  if (!security.empty()) {
+    qos.reset(dds_create_qos());
+    for (const auto& [name, value] : SecurityProperties(security))
+      dds_qset_prop(qos.get(), name.c_str(), value.c_str());
+  }
+  const dds_entity_t participant = dds_create_participant(domain, qos.get(), nullptr);
   if (participant < 0) return DdsFailure("join the domain", participant);
   return Entity(participant);
 }

@@ -63,7 +63,9 @@ class Domain {
 /// The error of a DDS call that returned `code` < 0.
 [[nodiscard]] tl::unexpected<Error> DdsFailure(const char* what, std::int32_t code);
 
-Result<Entity> MakeParticipant(std::uint32_t domain);
+/// `security` is a folder of credentials (credentials.h); empty: without DDS Security. Errors:
+/// kUnavailable: also where credentials are missing, do not fit or have ended.
+Result<Entity> MakeParticipant(std::uint32_t domain, const std::string& security);
 Result<Handle> MakeTopic(const Entity& participant, const dds_topic_descriptor& type,
                          const char* name);
 Result<Handle> MakeWriter(const Entity& participant, Handle topic);

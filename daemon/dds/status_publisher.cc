@@ -53,7 +53,7 @@ class StatusPublisher::Impl {
   static Result<std::unique_ptr<Impl>> Create(const DdsOptions& options) {
     auto impl = std::make_unique<Impl>();
     FOCALFLEET_TRY_ASSIGN(impl->domain_, Domain::Acquire(options.domain, options.config_xml));
-    FOCALFLEET_TRY_ASSIGN(impl->participant_, MakeParticipant(options.domain));
+    FOCALFLEET_TRY_ASSIGN(impl->participant_, MakeParticipant(options.domain, options.security));
     // The switch must come after the participant and before the writers: writers made earlier
     // ignore it.
     dds_write_set_batch(true);

@@ -27,6 +27,8 @@ struct DdsOptions {
   /// which uses the loopback interface only. The environment is not read: CYCLONEDDS_URI decides
   /// the destination only for a program that passes it here.
   std::string config_xml;
+  /// Folder of credentials for DDS Security (credentials.h); empty: without.
+  std::string security = {};
 };
 
 struct PublisherCounters {

@@ -1,6 +1,7 @@
 #include "daemon/http/http_server.h"
 
 #include <httplib.h>
+#include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -14,6 +15,7 @@
 #include <utility>
 
 #include "daemon/http/host_header.h"
+#include "daemon/http/tls.h"
 
 namespace focalfleet {
 namespace {
@@ -40,13 +42,17 @@ std::string PlainResponse(const char* status) {
 /// the library: Finish gives the answer then.
 class Connection final : public httplib::Stream {
  public:
-  Connection(int socket, const HttpLimits& limits, const std::atomic<bool>& ending)
+  Connection(int socket, std::unique_ptr<ByteStream> bytes, const HttpLimits& limits,
+             const std::atomic<bool>& ending)
       : socket_(socket),
+        bytes_(std::move(bytes)),
         limits_(limits),
         ending_(ending),
+        request_bytes_(limits.request_bytes),
         first_byte_by_(Clock::now() + limits.first_byte),
         ends_by_(Clock::now() + limits.connection) {}
   ~Connection() override {
+    bytes_.reset();
     ::shutdown(socket_, SHUT_RDWR);
     ::close(socket_);
   }
@@ -66,12 +72,20 @@ class Connection final : public httplib::Stream {
     return discards || Send(data, size, ends_by_) ? static_cast<ssize_t>(size) : -1;
   }
 
+  /// The request was admitted: its body, and its answer, may be longer and take longer.
+  void Admit() {
+    request_bytes_ = limits_.request_bytes + limits_.body_bytes;
+    ends_by_ = Clock::now() + limits_.admitted;
+  }
+  /// The request that is being answered.
+  HttpRouter::Admission admission;
+
   /// The client has its answer, also where the library had none for it.
   void Finish() {
     if (failure_ == Failure::kTooLong) Say("431 Request Header Fields Too Large");
     if (failure_ == Failure::kTooSlow && received_ > 0) Say("408 Request Timeout");
     if (received_ == 0) return;
-    ::shutdown(socket_, SHUT_WR);
+    bytes_->EndOutput();
     const auto until = Clock::now() + kDiscardWithin;
     for (std::size_t discarded = 0; discarded < kDiscardBytes;) {
       if (!Await(POLLIN, until)) return;
@@ -87,7 +101,16 @@ class Connection final : public httplib::Stream {
 
   [[nodiscard]] bool is_readable() const override { return true; }
   [[nodiscard]] bool is_writable() const override { return true; }
-  void get_remote_ip_and_port(std::string& /*ip*/, int& /*port*/) const override {}
+  void get_remote_ip_and_port(std::string& ip, int& port) const override {
+    sockaddr_storage peer{};
+    socklen_t length = sizeof peer;
+    std::array<char, NI_MAXHOST> name{};
+    port = 0;
+    auto* const address = reinterpret_cast<sockaddr*>(&peer);
+    if (::getpeername(socket_, address, &length) == 0 &&
+        ::getnameinfo(address, length, name.data(), name.size(), nullptr, 0, NI_NUMERICHOST) == 0)
+      ip = name.data();
+  }
   void get_local_ip_and_port(std::string& /*ip*/, int& /*port*/) const override {}
   [[nodiscard]] socket_t socket() const override { return socket_; }
 
@@ -109,37 +132,50 @@ class Connection final : public httplib::Stream {
     return false;
   }
 
+  /// Bytes are moved by `step`, as soon as the socket is ready. 0: closed, or not by then.
+  template <class Step>
+  std::size_t Move(Clock::time_point until, Step step) {
+    for (;;) {
+      const ByteStream::Moved moved = step();
+      if (moved.bytes > 0) return moved.bytes;
+      if (moved.wants == ByteStream::Wants::kClosed) {
+        failure_ = Failure::kClosed;
+        return 0;
+      }
+      const bool reads = moved.wants == ByteStream::Wants::kRead;
+      if (!Await(reads ? POLLIN : POLLOUT, until)) return 0;
+    }
+  }
+
   bool Refill() {
     if (failure_ != Failure::kNone) return false;
     taken_ = held_ = 0;
-    if (!Await(POLLIN, received_ == 0 ? std::min(first_byte_by_, ends_by_) : ends_by_)) {
-      failure_ = Failure::kTooSlow;
+    const auto until = received_ == 0 ? std::min(first_byte_by_, ends_by_) : ends_by_;
+    held_ = Move(until, [&] { return bytes_->Receive(buffer_.data(), buffer_.size()); });
+    if (held_ == 0) {
+      if (failure_ == Failure::kNone) failure_ = Failure::kTooSlow;
       return false;
     }
-    const ssize_t got = ::recv(socket_, buffer_.data(), buffer_.size(), MSG_DONTWAIT);
-    if (got <= 0) {
-      failure_ = Failure::kClosed;
-      return false;
-    }
-    held_ = static_cast<std::size_t>(got);
     received_ += held_;
-    if (received_ > limits_.request_bytes) failure_ = Failure::kTooLong;
+    if (received_ > request_bytes_) failure_ = Failure::kTooLong;
     return failure_ == Failure::kNone;
   }
 
   bool Send(const char* data, std::size_t size, Clock::time_point until) {
     for (std::size_t sent = 0; sent < size;) {
-      if (!Await(POLLOUT, until)) return false;
-      const ssize_t count = ::send(socket_, data + sent, size - sent, MSG_DONTWAIT | MSG_NOSIGNAL);
-      if (count < 0 && errno != EAGAIN && errno != EINTR) return false;
-      sent += count > 0 ? static_cast<std::size_t>(count) : 0;
+      const std::size_t count =
+          Move(until, [&] { return bytes_->Send(data + sent, size - sent); });
+      if (count == 0) return false;
+      sent += count;
     }
     return true;
   }
 
   int socket_;
+  std::unique_ptr<ByteStream> bytes_;
   const HttpLimits& limits_;
   const std::atomic<bool>& ending_;
+  std::size_t request_bytes_;
   Clock::time_point first_byte_by_;
   Clock::time_point ends_by_;
   Failure failure_ = Failure::kNone;
@@ -148,6 +184,9 @@ class Connection final : public httplib::Stream {
   std::size_t held_ = 0;
   std::size_t received_ = 0;
 };
+
+/// The connection that this thread serves. The library hands a request to handlers without it.
+thread_local Connection* served_connection = nullptr;
 
 /// A pool of threads that does at once, on the thread that accepts, what exceeds its places.
 class BoundedPool final : public httplib::TaskQueue {
@@ -171,9 +210,44 @@ class BoundedPool final : public httplib::TaskQueue {
   std::atomic<std::size_t> open_{0};
 };
 
+void Fill(const HttpAnswer& answer, httplib::Response* response) {
+  response->status = answer.status;
+  for (const auto& [name, value] : answer.headers) response->set_header(name, value);
+  response->set_content(answer.body, answer.content_type);
+}
+
 void Refuse(int status, const char* why, httplib::Response* response) {
-  response->status = status;
-  response->set_content(std::string(why) + "\n", "text/plain; charset=utf-8");
+  Fill({.status = status, .body = std::string(why) + "\n"}, response);
+}
+
+/// Headers of every answer: nothing of it is kept, guessed at, framed, or read by other sites, and
+/// a page runs nothing but what comes from this server.
+void Harden(bool tls, httplib::Response* response) {
+  response->set_header("Cache-Control", "no-store");
+  response->set_header("X-Content-Type-Options", "nosniff");
+  response->set_header("X-Frame-Options", "DENY");
+  response->set_header("Referrer-Policy", "no-referrer");
+  response->set_header("Cross-Origin-Opener-Policy", "same-origin");
+  response->set_header("Cross-Origin-Resource-Policy", "same-origin");
+  response->set_header("Content-Security-Policy",
+                       "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' "
+                       "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+                       "frame-ancestors 'none'");
+  if (tls) response->set_header("Strict-Transport-Security", "max-age=31536000");
+}
+
+HttpRequest RequestOf(const httplib::Request& from) {
+  HttpRequest request{.method = from.method, .path = from.path};
+  for (const auto& [name, value] : from.params) request.query.emplace(name, value);
+  request.host = from.get_header_value("Host");
+  request.origin = from.get_header_value("Origin");
+  request.fetch_site = from.get_header_value("Sec-Fetch-Site");
+  request.authorization = from.get_header_value("Authorization");
+  request.content_type = from.get_header_value("Content-Type");
+  request.content_encoding = from.get_header_value("Content-Encoding");
+  request.address = from.remote_addr;
+  request.body = from.body;
+  return request;
 }
 
 }  // namespace
@@ -189,9 +263,14 @@ class HttpServer::Listener final : public httplib::Server {
       ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
     });
     set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
-      Answer(request, &response);
-      return HandlerResponse::Handled;
+      return Decide(request, &response);
     });
+    // The path was compared with those of the routes before.
+    Post(".*", [this](const httplib::Request& request, httplib::Response& response) {
+      const Connection& connection = *served_connection;
+      Fill(options_.router->Answer(connection.admission, RequestOf(request)), &response);
+    });
+    set_payload_max_length(options_.limits.body_bytes);
   }
 
   /// The port on which it will accept connections; 0 and errno: it cannot.
@@ -224,34 +303,59 @@ class HttpServer::Listener final : public httplib::Server {
 
  private:
   bool process_and_close_socket(socket_t socket) override {
-    Connection connection(socket, options_.limits, ending_);
+    auto bytes = options_.tls == nullptr ? std::make_unique<ByteStream>(socket)
+                                         : options_.tls->Accept(socket);
+    Connection connection(socket, std::move(bytes), options_.limits, ending_);
     if (std::this_thread::get_id() == accepting_) {
-      connection.Say("503 Service Unavailable");
+      if (options_.tls == nullptr) connection.Say("503 Service Unavailable");
       return false;
     }
+    served_connection = &connection;
     bool closed = false;
     process_request(connection, /*close_connection=*/true, closed, nullptr);
+    served_connection = nullptr;
     connection.Finish();
     return true;
   }
 
-  void Answer(const httplib::Request& request, httplib::Response* response) const {
-    response->set_header("Cache-Control", "no-store");
-    response->set_header("X-Content-Type-Options", "nosniff");
+  HandlerResponse Decide(const httplib::Request& request, httplib::Response* response) const {
+    Harden(options_.tls != nullptr, response);
     if (request.get_header_value_count("Host") != 1 ||
-        !IsAllowedHost(request.get_header_value("Host"), options_.names))
-      return Refuse(403, "this server is not asked under that name", response);
+        !IsAllowedHost(request.get_header_value("Host"), options_.names)) {
+      Refuse(403, "this server is not asked under that name", response);
+    } else if (request.has_header("Range")) {
+      // The library would copy a page once for each of any number of ranges.
+      Refuse(400, "pages come whole", response);
+    } else if (options_.router != nullptr) {
+      return Route(request, response);
+    } else {
+      ShowPage(request, response);
+    }
+    return HandlerResponse::Handled;
+  }
+
+  HandlerResponse Route(const httplib::Request& request, httplib::Response* response) const {
+    const HttpRequest asked = RequestOf(request);
+    Connection& connection = *served_connection;
+    connection.admission = options_.router->Admit(asked);
+    if (connection.admission.refused) {
+      Fill(*connection.admission.refused, response);
+      return HandlerResponse::Handled;
+    }
+    if (!connection.admission.route->verb.empty()) connection.Admit();
+    if (request.method == "POST") return HandlerResponse::Unhandled;  // its body comes first
+    Fill(options_.router->Answer(connection.admission, asked), response);
+    return HandlerResponse::Handled;
+  }
+
+  void ShowPage(const httplib::Request& request, httplib::Response* response) const {
     if (request.method != "GET") {
       response->set_header("Allow", "GET");
       return Refuse(405, "only GET is answered", response);
     }
-    // The library would copy a page once for each of any number of ranges.
-    if (request.has_header("Range")) return Refuse(400, "pages come whole", response);
     const auto page = options_.pages.find(request.path);
     if (page == options_.pages.end()) return Refuse(404, "there is no such page", response);
-    const HttpAnswer answer = page->second();
-    response->status = answer.status;
-    response->set_content(answer.body, answer.content_type);
+    Fill(page->second(), response);
   }
 
   const HttpServer::Options& options_;

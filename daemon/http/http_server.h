@@ -1,9 +1,11 @@
 // A small HTTP server for pages that the daemon makes itself. The server has threads of its own and
 // takes no lock of the core. Each connection carries one request, and is bounded in bytes, in time,
-// and in how many there may be, so that no client can hold up another for long.
+// and in how many there may be, so that no client can hold up another for long. A request that the
+// router admitted has wider bounds, and its body is read only then.
 //
-// Only GET is answered, only under the server's own names (host_header.h), and no answer permits
-// pages of other sites to read it. An address in use is reported and tried again.
+// Requests are answered only under the server's own names (host_header.h), and no answer permits
+// pages of other sites to read it. Pages without a router are for GET and for everybody. An address
+// in use is reported and tried again.
 #pragma once
 
 #include <atomic>
@@ -18,13 +20,11 @@
 #include <thread>
 #include <vector>
 
-namespace focalfleet {
+#include "daemon/http/http_message.h"
+#include "daemon/http/router.h"
+#include "daemon/http/tls.h"
 
-struct HttpAnswer {
-  int status = 200;
-  std::string content_type = "text/plain; charset=utf-8";
-  std::string body;
-};
+namespace focalfleet {
 
 /// Limits that a server sets to its clients.
 struct HttpLimits {
@@ -39,6 +39,10 @@ struct HttpLimits {
   /// request waits (16 + 48) / 16 times `first_byte`.
   std::chrono::milliseconds first_byte{1000};
   std::chrono::milliseconds connection{5000};
+  /// The same for an admitted request: a targets file comes over a slow network, and an answer of
+  /// the core may wait for a plan.
+  std::size_t body_bytes = std::size_t{16} << 20;
+  std::chrono::milliseconds admitted{60'000};
 };
 
 class HttpServer {
@@ -49,6 +53,9 @@ class HttpServer {
     std::vector<std::string> names;  // under which it may be asked, beside the loopback names
     /// Pages by their path. A page is made on a thread of the server, by several at once.
     std::map<std::string, std::function<HttpAnswer()>> pages;
+    /// Takes the place of `pages` where there is one.
+    std::shared_ptr<const HttpRouter> router = nullptr;
+    std::shared_ptr<TlsContext> tls = nullptr;  // none: plain HTTP
     /// Receives each new reason why it does not listen, and an empty text when it listens again.
     std::function<void(const std::string& trouble)> tell = [](const std::string&) {};
     HttpLimits limits;

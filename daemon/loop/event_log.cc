@@ -90,6 +90,12 @@ void LogRow(const Row& row) {
   std::visit([](const auto& what) { Log(what); }, row);
 }
 
+void LogAuditHead(const AuditHead& head) {
+  const WithFields fields(
+      {.message_id = kAuditHeadMessageId, .unit = {}, .bus = {}, .configuration = {}});
+  spdlog::info("audit head {}", Text(head));
+}
+
 void LogLink(const LinkEvent& link, const std::string& name, const std::string& trouble) {
   const WithFields fields(
       {.message_id = kBusLinkMessageId, .unit = {}, .bus = link.bus, .configuration = {}});

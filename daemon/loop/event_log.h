@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "daemon/store/audit_chain.h"
 #include "fleet/coordinate/inputs.h"
 #include "fleet/records.h"
 #include "protocol/base/ids.h"
@@ -24,6 +25,7 @@ struct EventFields {
 inline constexpr const char* kAlarmMessageId = "5d0b3f7e6a0f4a58b7b8c1a1f62f9e10";
 inline constexpr const char* kConfigurationMessageId = "c2a4e0d9f5c44f0e9a51d3b7f0a86e21";
 inline constexpr const char* kUnitEnabledMessageId = "0f6c9b1d24e54c36a1d7e8c90b53fa32";
+inline constexpr const char* kAuditHeadMessageId = "b1f4a6d27c0e4d5b9e38a4c61d90f754";
 inline constexpr const char* kBusLinkMessageId = "8e71a5c3d0b94d2f8c640f9e2b17dc43";
 
 /// The fields of the event that this thread is writing; null: it has none. For sinks.
@@ -31,6 +33,9 @@ const EventFields* FieldsOfThisEvent();
 
 /// The row is in the log, where it is of a kind that people want to see.
 void LogRow(const Row& row);
+
+/// The head of the audit is in the log, so that a tail that is cut off later can be noticed.
+void LogAuditHead(const AuditHead& head);
 
 /// The change of a link is in the log. `name` is that of its interface or socket, `trouble` the
 /// reason why it is not up.

@@ -90,7 +90,7 @@ void Shell::Gather() {
 
 bool Shell::StepIsDue() const {
   return !frames_.empty() || !links_.empty() || !commands_.empty() || !plans_.empty() ||
-         !exposures_.empty() || !notes_.empty() ||
+         !exposures_.empty() || !notes_.empty() || parts_.audit->waiting() ||
          parts_.store->committed_through() != store_.committed_through ||
          parts_.store->failing() != store_.failing || now_ >= effects_.wake_at;
 }
@@ -124,10 +124,15 @@ void Shell::Perform() {
   LogChanges();
   NoteEffects(View(), effects_, parts_.models->compensation());
   if (parts_.metrics != nullptr) parts_.metrics->Note(View(), effects_);
-  parts_.alarms->Take(parts_.clock.Wall(), &effects_.rows);
+  const WallTime now = parts_.clock.Wall();
+  parts_.alarms->Take(now, &effects_.rows);
+  parts_.audit->Take(effects_.replies,
+                     parts_.coordinator->busy() ? parts_.coordinator->configuration().id : 0, now,
+                     &effects_.rows);
   if (!effects_.rows.empty()) {
-    last_batch_ = effects_.batch;
-    parts_.store->Commit(effects_.batch, std::move(effects_.rows));
+    // Entries of the audit alone belong to no batch of the coordinator: they go with its last one.
+    last_batch_ = std::max(last_batch_, effects_.batch);
+    parts_.store->Commit(last_batch_, std::move(effects_.rows));
   }
   parts_.passed(TurnPoint::kRowsGiven);
   for (const OutFrame& frame : effects_.frames) parts_.lines->Put(frame, now_);

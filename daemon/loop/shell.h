@@ -24,6 +24,7 @@
 #include "daemon/status/dds_troubles.h"
 #include "daemon/status/status_scheduler.h"
 #include "daemon/verbs/alarm_register.h"
+#include "daemon/verbs/audit_trail.h"
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/request_handler.h"
 #include "fleet/coordinator.h"
@@ -63,6 +64,7 @@ class Shell {
     RequestHandler* handler = nullptr;
     ModelRegistry* models = nullptr;  // the model in force
     AlarmRegister* alarms = nullptr;
+    AuditTrail* audit = nullptr;
     PlannerQueue* planner = nullptr;
     CameraQueue* camera = nullptr;  // none: neither camera nor sensors
     StoreWriter* store = nullptr;

@@ -240,13 +240,32 @@ bool IsNumericAddress(const std::string& address) {
          ::inet_pton(AF_INET6, address.c_str(), &place) == 1;
 }
 
+bool IsLoopback(const std::string& address) {
+  return address == "::1" || address.starts_with("127.");
+}
+
+void CheckHttp(const DaemonConfig::Http& http, Reader* reader) {
+  reader->Require(IsNumericAddress(http.address), "http", "address",
+                  "http.address must be a numeric address of this host, such as \"127.0.0.1\"");
+  reader->Require(http.certificate.empty() == http.key.empty(), "http", "key",
+                  "http.certificate and http.key belong together: give both or none");
+  reader->Require(http.port == 0 || http.tls() || IsLoopback(http.address), "http", "certificate",
+                  "http.address " + http.address +
+                      " is reached from elsewhere: that takes http.certificate and http.key");
+  reader->Require(http.port == 0 || !http.tokens.empty(), "http", "tokens",
+                  "http.tokens must name a file: without tokens nobody is admitted");
+}
+
 void CheckTogether(const DaemonConfig& config, Reader* reader) {
+  CheckHttp(config.http, reader);
   const bool socketcan = config.bus.port == PortKind::kSocketCan;
   reader->Require(!socketcan || !config.bus.interfaces.empty(), "bus", "interfaces",
                   "bus.interfaces must name one interface a bus for bus.port = \"socketcan\"");
   const std::set<std::string> names(config.bus.interfaces.begin(), config.bus.interfaces.end());
   reader->Require(names.size() == config.bus.interfaces.size() && !names.contains(""), "bus",
                   "interfaces", "bus.interfaces must name each interface once");
+  reader->Require(config.bus.opener.empty() || socketcan, "bus", "opener",
+                  "bus.opener needs bus.port = \"socketcan\"");
   reader->Require(!config.bus.can_fd || socketcan, "bus", "can_fd",
                   "bus.can_fd needs bus.port = \"socketcan\": simulated buses and UNIX sockets "
                   "carry classic frames only");
@@ -298,6 +317,8 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   config.timing.reads_sensors = !config.hall.model.empty();
   config.timing.data_bit_rate_bps = config.bus.can_fd ? config.bus.data_bit_rate_bps : 0;
   config.timing.sync_line = !config.sync.chip.empty();
+  config.http.tokens_at = reader.At("http", "tokens");
+  config.control.roles_at = reader.At("control", "engineers");
   config.sync.chip_at = reader.At("sync", "chip");
   config.bus.interfaces_at = reader.At("bus", "interfaces");
   config.log.file_at = reader.At("log", "file");

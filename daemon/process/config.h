@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/access/role_groups.h"
 #include "fleet/camera/camera_model.h"
 #include "fleet/camera/spots.h"
 #include "fleet/coordinator.h"
@@ -31,12 +32,15 @@ struct DaemonConfig {
   } store;
   struct Control {
     std::string socket = "control.sock";
+    RoleGroups::Names roles;  // empty: whoever the socket's file lets in may do everything
+    std::string roles_at;     // file:line, for messages
   } control;
   struct Dds {
     bool enabled = true;
     std::uint32_t domain = 0;
     double rate_hz = 10;  // limit of how often the status of changed units is published
     std::string config;   // Cyclone's XML file; empty: loopback only
+    std::string security;  // folder of credentials for DDS Security; empty: without
   } dds;
   struct Log {
     std::string level = "info";
@@ -49,6 +53,16 @@ struct DaemonConfig {
     std::uint16_t port = 0;             // 0: no metrics are served
     std::vector<std::string> names;     // of this host, beside the loopback names and `address`
   } metrics;
+  struct Http {
+    std::string address = "127.0.0.1";  // numeric
+    std::uint16_t port = 0;             // 0: there is no HTTP door
+    std::vector<std::string> names;     // of this host, beside the loopback names and `address`
+    std::string certificate;            // PEM; empty: plain HTTP, on the loopback interface only
+    std::string key;                    // PEM
+    std::string tokens = "tokens.csv";  // access/token.h
+    std::string tokens_at;              // file:line, for messages
+    [[nodiscard]] bool tls() const { return !certificate.empty(); }
+  } http;
   struct Bus {
     PortKind port = PortKind::kUnix;
     std::uint32_t bit_rate_bps = 1'000'000;
@@ -57,6 +71,8 @@ struct DaemonConfig {
     std::string unix_directory;                   // where bus<ID>.sock are
     std::vector<std::string> interfaces;          // by ascending bus id
     std::string interfaces_at;                    // file:line, for messages
+    std::string opener;                           // socket of the program that opens CAN sockets in
+                                                  // a network namespace; empty: in the daemon's own
   } bus;
   struct Sync {
     std::string chip;  // GPIO chip that pulses at the common start; empty: no SYNC line

@@ -80,7 +80,14 @@ void VisitKeys(Config* c, Visitor* visit) {
                "0: all of it stays");
   visit->Section("control", "The socket of the command line");
   visit->Path("socket", &c->control.socket,
-              "Control socket for the command line; owner and group may use it");
+              "Control socket for the command line; owner and group may use it, or, where groups "
+              "have roles, all who have one");
+  visit->Texts("viewers", &c->control.roles.viewers,
+               "Groups whose members may ask, and stop the fleet; where no group has a role, "
+               "whoever may use the socket may do everything");
+  visit->Texts("operators", &c->control.roles.operators,
+               "Groups whose members may also move the fleet");
+  visit->Texts("engineers", &c->control.roles.engineers, "Groups whose members may do everything");
   visit->Section("dds", "Status for many readers");
   visit->Flag("enabled", &c->dds.enabled, "Whether status is published through DDS");
   visit->Whole("domain", &c->dds.domain, {0, 230}, "DDS domain");
@@ -88,6 +95,9 @@ void VisitKeys(Config* c, Visitor* visit) {
               "Highest rate of the status of changed units, in real time");
   visit->Path("config", &c->dds.config,
               "Cyclone DDS XML; empty: the loopback interface only; $CYCLONEDDS_URI is not read");
+  visit->Path("security", &c->dds.security,
+              "Folder of credentials for DDS Security, as make-keys writes it; empty: everybody in "
+              "the domain may read and write");
   visit->Section("log", "The daemon's log");
   visit->Choice("level", &c->log.level, kLogLevels, "The least important lines that are logged");
   visit->Path("file", &c->log.file,
@@ -100,6 +110,16 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Whole("port", &c->metrics.port, {0, 65'535}, "Port; 0: no metrics are served");
   visit->Texts("names", &c->metrics.names,
                "Names of this host by which it may be asked, beside localhost and the address");
+  visit->Section("http", "Verbs and pages over HTTP, for those who have a token");
+  visit->Text("address", &c->http.address,
+              "Numeric address to listen at; other than loopback only with certificate and key");
+  visit->Whole("port", &c->http.port, {0, 65'535}, "Port; 0: there is no HTTP door");
+  visit->Texts("names", &c->http.names,
+               "Names of this host by which it may be asked, beside localhost and the address");
+  visit->Path("certificate", &c->http.certificate,
+              "Certificate with its chain, PEM; empty: plain HTTP, on the loopback interface only");
+  visit->Path("key", &c->http.key, "Key of the certificate, PEM");
+  visit->Path("tokens", &c->http.tokens, "File of tokens, made by focalfleet token add");
   visit->Section("bus", "The CAN buses");
   visit->Index(
       "port", &c->bus.port, kPortKindNames,
@@ -116,6 +136,9 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Texts("interfaces", &c->bus.interfaces,
                "socketcan: one interface a bus, in ascending order of bus_id; a missing one is a "
                "bus that is down");
+  visit->Path("opener", &c->bus.opener,
+              "socketcan: socket of focalfleet-can-opener, which opens the interfaces in a network "
+              "namespace of their own; empty: they are in the daemon's");
   VisitInstrumentKeys(c, visit);
   visit->Section("clock", "Host time");
   visit->Real("speed", &c->clock.speed, {0.01, 1000},

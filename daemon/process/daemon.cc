@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -18,13 +19,16 @@
 #include "daemon/metrics/metrics_sampler.h"
 #include "daemon/process/bounded_end.h"
 #include "daemon/process/caught_jobs.h"
+#include "daemon/process/control_door.h"
 #include "daemon/process/counted_commit.h"
+#include "daemon/process/dds_setup.h"
 #include "daemon/process/fleet_setup.h"
+#include "daemon/process/http_door.h"
 #include "daemon/process/log.h"
 #include "daemon/process/slow_end.h"
 #include "daemon/process/store_upkeep.h"
-#include "daemon/status/buffered_status_publisher.h"
 #include "daemon/status/dds_troubles.h"
+#include "daemon/status/renewing_status_publisher.h"
 #include "daemon/store/store.h"
 #include "daemon/store/store_reader.h"
 #include "daemon/systemd/notify_socket.h"
@@ -61,7 +65,8 @@ struct Service {
 /// The fleet's status on its way to DDS.
 struct StatusOutput {
   std::unique_ptr<DdsTroubles> troubles;
-  std::unique_ptr<BufferedStatusPublisher> publisher;  // none: DDS is off
+  std::unique_ptr<RenewingStatusPublisher> publisher;  // none: DDS is off
+  std::unique_ptr<CredentialWatch> credentials;        // none: no DDS Security
   std::unique_ptr<StatusScheduler> scheduler;          // none: DDS is off
   std::unique_ptr<StatusThread> thread;  // none: DDS is off. Ends before the publisher
   std::unique_ptr<BoundedEnd> ending;
@@ -72,6 +77,13 @@ struct Measuring {
   std::unique_ptr<CameraWorker> camera;          // none: there is no camera
   std::unique_ptr<FibreCarrierWorker> carriers;  // none: no unit has sensors of its own
   std::unique_ptr<CameraThread> thread;          // none: neither camera nor sensors
+};
+
+/// Where requests come in.
+struct Doors {
+  AuditTrail audit;
+  std::unique_ptr<RequestHandler> handler;
+  std::unique_ptr<HttpServer> http;  // none: [http] has no port
 };
 
 struct StoreThreads {
@@ -97,10 +109,6 @@ ShellNote NoteOfMetrics(const std::string& trouble) {
     return {AlarmName::kMetricsBack, "metrics are served again", AlarmName::kMetricsMissing};
   return {AlarmName::kMetricsMissing,
           "no metrics, the fleet works on and it is tried again: " + trouble};
-}
-
-DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds) {
-  return {.domain = dds.domain, .config_xml = dds.config.empty() ? "" : "file://" + dds.config};
 }
 
 class Daemon {
@@ -146,7 +154,7 @@ class Daemon {
   std::unique_ptr<PlannerThread> planner_;
   std::unique_ptr<ModelRegistry> models_;
   AlarmRegister alarms_;
-  std::unique_ptr<RequestHandler> handler_;
+  Doors doors_;
   std::unique_ptr<SyncPulse> sync_;  // none: no SYNC line
   std::unique_ptr<EventLoop> loop_;
   std::unique_ptr<BoundedEnd> ending_;
@@ -182,10 +190,10 @@ Status Daemon::Start() {
 }
 
 Status Daemon::OpenRequestHandler() {
-  FOCALFLEET_TRY_ASSIGN(LineServer server, LineServer::Create(config_.control.socket,
-                                                              {.urgent = &RequestHandler::IsStop}));
+  FOCALFLEET_TRY_ASSIGN(LineServer server, OpenControl(config_.control));
+  doors_.audit = AuditTrail(ReadBootId());
   models_ = std::make_unique<ModelRegistry>(layout_.get());
-  handler_ = std::make_unique<RequestHandler>(
+  doors_.handler = std::make_unique<RequestHandler>(
       std::move(server),
       RequestHandler::Options{.progress_period = clock_.Real(Milliseconds(200)),
                               .second = clock_.Real(Seconds(1)),
@@ -193,7 +201,9 @@ Status Daemon::OpenRequestHandler() {
                               .log = [](const std::string& text) { spdlog::info("{}", text); },
                               .store_path = config_.store.path,
                               .models = models_.get(),
-                              .alarms = &alarms_});
+                              .alarms = &alarms_,
+                              .audit = &doors_.audit,
+                              .own_pid = static_cast<std::uint32_t>(::getpid())});
   if (const Status restored = RestoreLastModel(); !restored)
     spdlog::error("no model is in force: {}", restored.error().text);
   return {};
@@ -205,17 +215,17 @@ Status Daemon::RestoreLastModel() {
 }
 
 void Daemon::OpenStatus() {
-  const bool speaks = config_.dds.enabled || config_.camera.dds;
-  if (speaks && std::getenv("CYCLONEDDS_URI") != nullptr)
-    spdlog::warn("CYCLONEDDS_URI is set and is not used: dds.config says where status goes, {}",
-                 config_.dds.config.empty() ? "the loopback interface only" : config_.dds.config);
+  if (config_.dds.enabled || config_.camera.dds) WarnOfDdsEnvironment(config_.dds);
   if (!config_.dds.enabled) return;
-  status_.publisher = std::make_unique<BufferedStatusPublisher>(LateJoin<StatusPublisher>::Options{
-      .join = [dds = DdsOptionsOf(config_.dds)] { return StatusPublisher::Create(dds); },
-      .tell =
-          [this](const std::string& trouble) {
-            status_.troubles->Report(AlarmName::kDdsMissing, "status", trouble);
-          }});
+  status_.publisher = std::make_unique<RenewingStatusPublisher>(RenewingStatusPublisher::Options{
+      .join = {.join = [dds = DdsOptionsOf(config_.dds)] { return StatusPublisher::Create(dds); },
+               .tell =
+                   [this](const std::string& trouble) {
+                     status_.troubles->Report(AlarmName::kDdsMissing, "status", trouble);
+                   }},
+      .renews = !config_.dds.security.empty()});
+  status_.credentials =
+      WatchCredentials(config_.dds, status_.troubles.get(), [this] { status_.publisher->Renew(); });
   status_.scheduler = std::make_unique<StatusScheduler>(
       layout_->size(),
       StatusScheduler::Options{
@@ -313,7 +323,7 @@ Status Daemon::StartStatusThread() {
 Status Daemon::StartThreads() {
   FOCALFLEET_TRY(StartStatusThread());
   StoreThread::Sinks sinks = StoreSinks();
-  FOCALFLEET_TRY_ASSIGN(sinks.upkeep, PruningOf(store_.get(), config_.store.keep_days));
+  FOCALFLEET_TRY_ASSIGN(sinks.upkeep, UpkeepOf(store_.get(), config_.store.keep_days));
   FOCALFLEET_TRY_ASSIGN(stored_.writer, StoreThread::Create(std::move(sinks), signal_.get()));
   FOCALFLEET_TRY_ASSIGN(
       planner_, PlannerThread::Create(
@@ -339,9 +349,10 @@ Status Daemon::StartThreads() {
   FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.shell = {.layout = layout_.get(),
                                                             .coordinator = coordinator_.get(),
                                                             .lines = lines_.get(),
-                                                            .handler = handler_.get(),
+                                                            .handler = doors_.handler.get(),
                                                             .models = models_.get(),
                                                             .alarms = &alarms_,
+                                                            .audit = &doors_.audit,
                                                             .planner = planner_.get(),
                                                             .camera = measuring_.thread.get(),
                                                             .store = &stored_.writer->writer(),
@@ -355,6 +366,7 @@ Status Daemon::StartThreads() {
                                                   .threads = signal_.get(),
                                                   .hang_up = &ReopenLog}));
   ServeMetrics();
+  FOCALFLEET_TRY_ASSIGN(doors_.http, OpenHttp(config_.http, config_.control.socket));
   return {};
 }
 
@@ -420,17 +432,19 @@ Status Daemon::End() {
                                     {"the planner", [this] { planner_.reset(); }},
                                     {"the camera", [this] { measuring_.thread.reset(); }},
                                     {"the metrics", [this] { metrics_.endpoint.reset(); }},
+                                    {"HTTP", [this] { doors_.http.reset(); }},
                                     // A question that runs is cut short.
                                     {"the reader", [this] { stored_.reader.reset(); }}});
   const Status stored = stored_.writer->Finish();
-  handler_->Close();
+  doors_.handler->Close();
   status_.ending =
       std::make_unique<BoundedEnd>(std::vector<BoundedEnd::Part>{{"the status", [this] {
+                                                                    status_.credentials.reset();
                                                                     status_.thread.reset();
                                                                     status_.publisher.reset();
                                                                   }}});
   store_.reset();
-  handler_.reset();
+  doors_.handler.reset();
   std::vector<std::string> left = ending_->Wait(kEndWithin);
   for (std::string& part : status_.ending->Wait(kStatusEndWithin)) left.push_back(std::move(part));
   left_ = !left.empty();
@@ -481,15 +495,6 @@ DaemonEnd RunDaemon(const DaemonConfig& config) {
   const bool left = daemon->left();
   if (left) static_cast<void>(daemon.release());  // a part that hangs still uses it
   return {std::move(ended), left};
-}
-
-Result<std::string> CheckDaemon(const DaemonConfig& config) {
-  FOCALFLEET_TRY_ASSIGN(const Layout layout, LoadLayout(config.fleet));
-  FOCALFLEET_TRY(CheckInterfaces(config, layout));
-  if (config.camera.present()) FOCALFLEET_TRY(LoadCameraSite(config.camera));
-  FOCALFLEET_TRY(OpenFibreCarriers(config.hall, layout));
-  return "# " + std::to_string(layout.size()) + " units on " +
-         std::to_string(layout.buses().size()) + " buses\n" + EffectiveConfig(config);
 }
 
 }  // namespace focalfleet

@@ -3,6 +3,9 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <utility>
+
+#include "daemon/loop/event_log.h"
 
 namespace focalfleet {
 
@@ -18,6 +21,23 @@ Result<std::function<bool()>> PruningOf(Store* store, std::uint32_t keep_days) {
     const auto gone = store->Prune(before, kRowsAtOnce);
     if (!gone) spdlog::warn("old history stays for now: {}", gone.error().text);
     return gone && gone->more;
+  };
+}
+
+Result<std::function<bool()>> UpkeepOf(Store* store, std::uint32_t keep_days) {
+  FOCALFLEET_TRY_ASSIGN(auto prune, PruningOf(store, keep_days));
+  return [store, prune = std::move(prune), reported = AuditHead(), more = false]() mutable {
+    // Pieces of pruning follow one another; the head is for the first of each round.
+    if (!more) {
+      const auto head = store->LastAudit();
+      if (!head) spdlog::warn("the head of the audit is not known: {}", head.error().text);
+      if (head && *head != reported) {
+        reported = *head;
+        LogAuditHead(*head);
+      }
+    }
+    more = prune();
+    return more;
   };
 }
 

@@ -44,7 +44,8 @@ Status Life::Open() {
                                                .store_path = kStorePath,
                                                .store = OptionsOf(*around_.disk),
                                                .models = models_.get(),
-                                               .alarms = &alarms_});
+                                               .alarms = &alarms_,
+                                               .audit = &audit_});
   const auto restored = [&]() -> Status {
     FOCALFLEET_TRY_ASSIGN(const auto reader,
                           StoreReader::Open(kStorePath, OptionsOf(*around_.disk)));
@@ -131,6 +132,7 @@ void Life::MakeShell() {
                                                 .handler = handler_.get(),
                                                 .models = models_.get(),
                                                 .alarms = &alarms_,
+                                                .audit = &audit_,
                                                 .planner = planner_.get(),
                                                 .camera = camera_.get(),
                                                 .store = writer_.get(),

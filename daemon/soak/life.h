@@ -88,6 +88,7 @@ class Life {
   std::unique_ptr<BusLines> lines_;
   std::unique_ptr<ModelRegistry> models_;
   AlarmRegister alarms_;
+  AuditTrail audit_{"soak"};
   LineHall* hall_ = nullptr;  // of the handler
   std::unique_ptr<RequestHandler> handler_;
   std::unique_ptr<StatusScheduler> scheduler_;

@@ -22,7 +22,8 @@ class LineHall final : public LineExchange {
   explicit LineHall(Hooks hooks) : hooks_(std::move(hooks)) {}
 
   void Put(ClientId client, std::string line) {
-    lines_.push_back({.client = client, .text = std::move(line)});
+    lines_.push_back(
+        {.client = client, .text = std::move(line), .caller = {.role = Role::kEngineer}});
   }
   [[nodiscard]] bool waits() const { return !lines_.empty(); }
 

@@ -30,6 +30,7 @@ class BufferedStatusPublisher {
 
   // ---- any thread may ask
 
+  [[nodiscard]] bool joined() const { return joined_.get() != nullptr; }
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 

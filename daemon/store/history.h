@@ -86,6 +86,14 @@ struct EntriesAfter {
   std::vector<ConfigurationHistory> ended;
 };
 
+/// Entries of the audit that are asked for, the newest `limit` of them.
+struct AuditFilter {
+  Period period = {};
+  std::string name = {};  // of the caller; empty: all
+  std::string verb = {};  // empty: all
+  std::uint32_t limit = 1000;
+};
+
 struct MeasurementHistory {
   MeasurementRow row;
   WallTime at;  // when it was stored

@@ -208,6 +208,8 @@ Status LoadMeta(Connection& connection, StoredFleet* fleet) {
                              fleet->next_exposure = cells.Whole<std::uint64_t>(1);
                            } else if (key == "next_alarm") {
                              fleet->next_alarm = cells.Whole<std::uint64_t>(1);
+                           } else if (key == "audit_entries") {
+                             cells.Whole<std::uint64_t>(1);  // CheckAudit compares it
                            } else if (key == "open_intents") {
                              cells.Require(cells.Whole<std::uint64_t>(1) == open,
                                            "so many moves are not open: rows are lost");

@@ -1,5 +1,7 @@
 #include "daemon/store/row_writer.h"
 
+#include "daemon/store/audit_rows.h"
+
 namespace focalfleet::store_internal {
 namespace {
 
@@ -256,6 +258,19 @@ Status RowWriter::Put(const ModelRow& row) {
   s.BindReal(8, row.rms_after_um);
   s.Bind(9, now_.ns);
   return s.Run();
+}
+
+Status RowWriter::Put(const AuditRow& row) {
+  FOCALFLEET_TRY_ASSIGN(const AuditHead before, ReadAuditHead(&statements_[Sql::kAuditHead]));
+  AuditEntry entry{.entry = before.entry + 1,
+                   .at = now_,
+                   .row = row,
+                   .previous_sha256 = before.sha256,
+                   .sha256 = {}};
+  entry.sha256 = ChainedSha256(entry);
+  BindAuditEntry(entry, &statements_[Sql::kAudit]);
+  FOCALFLEET_TRY(statements_[Sql::kAudit].Run());
+  return SetMeta(statements_[Sql::kSetMeta], "audit_entries", entry.entry);
 }
 
 Status RowWriter::WriteAxis(const VectorRow& row, Axis axis) {

@@ -38,6 +38,7 @@ class RowWriter {
   Status Put(const MuteRow& row);
   Status Put(const NextMoveRow& row);
   Status Put(const ModelRow& row);
+  Status Put(const AuditRow& row);
   Status WriteAxis(const VectorRow& row, Axis axis);
   Status WriteOrientation(const MeasurementRow& row, const FibreCarrierReading& carrier);
   Status KeepVector(const VectorRow& row, Axis axis);

@@ -8,6 +8,8 @@
 #include <cstring>
 #include <string_view>
 
+#include "daemon/store/audit_schema.h"
+
 namespace focalfleet::store_internal {
 namespace {
 
@@ -392,7 +394,8 @@ INSERT INTO meta(key, value, checksum) SELECT 'open_intents', count(*),
 )sql";
 
 constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4, kVersion5,
-                                       kVersion6, kVersion7, kVersion8, kVersion9, kVersion10};
+                                       kVersion6, kVersion7, kVersion8, kVersion9, kVersion10,
+                                       kAuditStep};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

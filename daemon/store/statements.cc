@@ -2,6 +2,8 @@
 
 #include <iterator>
 
+#include "daemon/store/audit_rows.h"
+
 namespace focalfleet::store_internal {
 namespace {
 
@@ -156,6 +158,8 @@ Result<std::unique_ptr<Statements>> PrepareAll(Connection& connection) {
       {Sql::kRaiseMeta, kRaiseMeta},
       {Sql::kSetMeta, kSetMeta},
       {Sql::kAddMeta, kAddMeta},
+      {Sql::kAudit, kAuditInsert},
+      {Sql::kAuditHead, kAuditHead},
   };
   static_assert(std::size(list) == kSqlCount);
   for (const auto& [which, text] : list) {

@@ -38,8 +38,10 @@ enum class Sql : std::uint8_t {
   kRaiseMeta,
   kSetMeta,
   kAddMeta,
+  kAudit,
+  kAuditHead,
 };
-inline constexpr std::size_t kSqlCount = static_cast<std::size_t>(Sql::kAddMeta) + 1;
+inline constexpr std::size_t kSqlCount = static_cast<std::size_t>(Sql::kAuditHead) + 1;
 
 class Statements {
  public:

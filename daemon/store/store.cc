@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <variant>
 
+#include "daemon/store/audit_rows.h"
 #include "daemon/store/cells.h"
 #include "daemon/store/lock_file.h"
 #include "daemon/store/pruner.h"
@@ -138,6 +139,8 @@ Result<WallTime> Store::Newest() {
           "0), coalesce((SELECT changed_ns FROM configuration ORDER BY id DESC LIMIT 1), 0))"));
   return WallTime{ns};
 }
+
+Result<AuditHead> Store::LastAudit() { return ReadAuditHead(&(*statements_)[Sql::kAuditHead]); }
 
 Result<Pruned> Store::Prune(WallTime before, std::uint32_t rows_max) {
   const auto fail = [this](const Error& why) {

@@ -17,6 +17,7 @@
 #include <string>
 
 #include "daemon/clock/wall_time.h"
+#include "daemon/store/audit_chain.h"
 #include "daemon/store/history.h"
 #include "daemon/store/store_options.h"
 #include "fleet/records.h"
@@ -77,6 +78,9 @@ class Store {
 
   /// The time of the newest row of the history; 0: there is none.
   Result<WallTime> Newest();
+
+  /// The last entry of the audit; number 0: there is none.
+  Result<AuditHead> LastAudit();
 
   /// A piece of all history is rid of what is from before `before`: ended moves, configurations,
   /// measurements, orientations, alarms, histories of units, axes, parameters and tunings.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/clock/wall_time.h"
+#include "daemon/store/audit_chain.h"
 #include "daemon/store/history.h"
 #include "daemon/store/store_options.h"
 #include "fleet/records.h"
@@ -64,6 +65,11 @@ class StoreReader {
   Result<EntryNumbers> NewestEntries();
   /// At most `limit` of each kind, the oldest first.
   Result<EntriesAfter> After(const EntryNumbers& numbers, std::uint32_t limit);
+  /// The newest first.
+  Result<std::vector<AuditEntry>> Audit(const AuditFilter& filter);
+  /// The chain of the audit from its first entry to its last one, and whether `heads` that were
+  /// told outside are part of it. Cost: some 10 us an entry.
+  Result<AuditVerdict> CheckAudit(const std::vector<AuditHead>& heads);
   /// Queries end with kUnavailable once `ending` is true. Pre: `ending` outlives them.
   void EndWith(const std::atomic<bool>* ending);
 

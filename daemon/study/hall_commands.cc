@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "daemon/campaign/sha256.h"
+#include "daemon/access/sha256.h"
 #include "daemon/cli/table.h"
 #include "daemon/cli/table_input.h"
 #include "daemon/files/text_file.h"

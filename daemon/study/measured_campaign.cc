@@ -8,8 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/access/sha256.h"
 #include "daemon/campaign/campaign_files.h"
-#include "daemon/campaign/sha256.h"
 #include "daemon/cli/table_input.h"
 #include "daemon/files/text_file.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "daemon/campaign/sha256.h"
+#include "daemon/access/sha256.h"
 
 namespace focalfleet {
 namespace {

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/access/rights.h"
 #include "daemon/status/history_json.h"
 #include "daemon/status/status_json.h"
 #include "daemon/verbs/alarm_requests.h"
+#include "daemon/verbs/audit_requests.h"
 #include "daemon/verbs/history_requests.h"
 #include "daemon/verbs/model_upkeep.h"
 #include "daemon/verbs/preview_json.h"
@@ -46,16 +48,13 @@ std::optional<Result<Json>> AskOpenAlarms(const FleetView& view, const ControlRe
 std::optional<Result<StoreReading>> AskStore(const FleetView& view, const ControlRequest& request,
                                              const AlarmRegister& alarms) {
   if (request.verb == "params") return AskParameters(request, view);
+  if (request.verb == "audit") return AskAudit(request);
+  if (request.verb == "audit_check") return AskAuditCheck(request);
   if (request.verb == "history") return AskHistory(request, view);
   if (request.verb == "events") return AskEvents(request, view);
   if (request.verb == "alarms") return AskAlarms(request, alarms, view.at);
   if (request.verb == "measurements") return AskMeasurements(request, view);
   return std::nullopt;
-}
-
-/// The user of the client, by number: a name may be slow to find.
-std::string UserOf(const IncomingLine& line) {
-  return line.user ? "uid " + std::to_string(*line.user) : "";
 }
 
 bool HasMoved(const ConfigurationView& configuration) {
@@ -97,6 +96,39 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
                   Fail(ErrorCode::kFull, "too many clients, only stop is taken: all " +
                                              std::to_string(limits::kControlClients) +
                                              " places have requests open, try again later"));
+  const bool for_other =
+      request->caller && line.caller.peer && line.caller.peer->pid == options_.own_pid;
+  if (request->caller && !for_other) {
+    const Error why{ErrorCode::kRefused, "only the daemon itself asks on behalf of others"};
+    NoteRefusal(view, line, {*request, line.caller}, why);
+    return Answer(pending, tl::unexpected<Error>(why));
+  }
+  Do(view, line, {*request, for_other ? *request->caller : line.caller}, commands);
+}
+
+Status RequestHandler::Permit(const FleetView& view, const IncomingLine& line, const Asked& asked) {
+  const Status permitted = CheckRight(asked.caller, asked.request.verb, asked.request.args);
+  if (!permitted && permitted.error().code == ErrorCode::kRefused)
+    NoteRefusal(view, line, asked, permitted.error());
+  return permitted;
+}
+
+void RequestHandler::NoteRefusal(const FleetView& view, const IncomingLine& line,
+                                 const Asked& asked, const Error& why) {
+  const std::string text =
+      refusals_.Admit({view.now.ns}, asked.request.verb + " refused: " + why.text);
+  if (!text.empty()) options_.log(text);
+  if (options_.audit != nullptr)
+    options_.audit->Refused(asked.caller, asked.request.verb, line.text, why);
+}
+
+void RequestHandler::Do(const FleetView& view, const IncomingLine& line, const Asked& asked,
+                        std::vector<Command>* commands) {
+  const ControlRequest* const request = &asked.request;
+  Pending pending{.client = line.client, .id = request->id};
+  if (const Status permitted = Permit(view, line, asked); !permitted)
+    return Answer(pending, tl::unexpected<Error>(permitted.error()));
+  if (request->verb == "access") return Answer(pending, AccessJson(asked.caller));
   if (request->verb == "state") {
     // The answer is spliced in as text, into the frame that EncodeResult makes.
     std::string answer = EncodeResult(request->id, nullptr);
@@ -125,15 +157,19 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
   pending.wait = *wait && pending.is_configuration;
   auto change = ChangeModel(view, *request);
-  if (!change) change = ChangeAlarms(*request, options_.alarms, UserOf(line), view.at);
+  if (!change) change = ChangeAlarms(*request, options_.alarms, NameOf(asked.caller), view.at);
   auto command = change ? std::move(*change) : CommandOf(*request, view);
   if (!command) {
     options_.log(request->verb + " refused: " + FirstRow(command.error().text));
+    if (options_.audit != nullptr)
+      options_.audit->Refused(asked.caller, request->verb, line.text, command.error());
     return Answer(pending, tl::unexpected<Error>(command.error()));
   }
-  options_.log(request->verb + " commanded");
+  options_.log(request->verb + " commanded by " + Describe(asked.caller));
   pending.note = NoteOn(view, *command);
   command->request = next_request_++;
+  if (options_.audit != nullptr)
+    options_.audit->Commanded(command->request, asked.caller, request->verb, line.text);
   pending_.emplace(command->request, pending);
   waiting_ += pending.gets_progress() ? 1u : 0u;
   commands->push_back(std::move(*command));

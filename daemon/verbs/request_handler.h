@@ -7,6 +7,9 @@
 // its client. A turn with a stop handles no other line, so that the frames of the stop are on the
 // buses before any answer is computed. Where the next turn brings a stop again, other lines are
 // handled too.
+// Each verb takes a role (access/rights.h). A request that its caller may not make is refused, named
+// in the log and kept for the audit, as is each command.
+//
 // Requests of other verbs share a budget a turn (kTurnBytes); after it, the loop serves buses,
 // signals and the next stop first. Motions that a stop overtook are refused, because the stop was
 // meant for them, too.
@@ -23,11 +26,13 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/access/log_limit.h"
 #include "daemon/control/line_server.h"
 #include "daemon/status/shell_facts.h"
 #include "daemon/status/status_snapshot.h"
 #include "daemon/store/store_reader.h"
 #include "daemon/verbs/alarm_register.h"
+#include "daemon/verbs/audit_trail.h"
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/store_questions.h"
 #include "fleet/coordinate/preview.h"
@@ -46,6 +51,8 @@ class RequestHandler {
     StoreOptions store = {};
     ModelRegistry* models = nullptr;  // outlives the handler
     AlarmRegister* alarms = nullptr;  // likewise
+    AuditTrail* audit = nullptr;      // likewise; none: nothing is kept
+    std::uint32_t own_pid = 0;        // clients of this process may ask on behalf of others
   };
   RequestHandler(std::unique_ptr<LineExchange> server, Options options)
       : server_(std::move(server)), options_(std::move(options)) {}
@@ -105,6 +112,11 @@ class RequestHandler {
     /// Its answer may take minutes: progress shows the client that the daemon lives.
     [[nodiscard]] bool gets_progress() const { return wait || is_retarget; }
   };
+  /// A request, and who makes it.
+  struct Asked {
+    const ControlRequest& request;
+    const Caller& caller;
+  };
   /// A dry run while the planner has it.
   struct DryRun {
     Pending pending;
@@ -114,6 +126,13 @@ class RequestHandler {
   };
 
   void Handle(const FleetView& view, const IncomingLine& line, std::vector<Command>* commands);
+  void Do(const FleetView& view, const IncomingLine& line, const Asked& asked,
+          std::vector<Command>* commands);
+  /// The caller may ask this. Errors: as CheckRight; the refusal is noted.
+  Status Permit(const FleetView& view, const IncomingLine& line, const Asked& asked);
+  /// The refusal is logged and kept.
+  void NoteRefusal(const FleetView& view, const IncomingLine& line, const Asked& asked,
+                   const Error& why);
   void Wait(const FleetView& view, const ControlRequest& request, Pending pending);
   void AnswerWaiters(const FleetView& view);
   /// The dry run is with the planner. Errors: as `apply`; kFull: another one is.
@@ -140,6 +159,7 @@ class RequestHandler {
   std::vector<IncomingLine> stops_;
   bool stopped_ = false;         // the last turn handled stops alone
   std::size_t spent_bytes_ = 0;  // in this turn
+  LogLimit refusals_;
   std::optional<DryRun> dry_run_;
   std::optional<PlanJob> preview_job_;
 };

@@ -30,6 +30,7 @@ class MemoryStore {
   std::vector<AlarmRow> alarms;
   std::vector<AlarmEndRow> alarm_ends;
   std::vector<ConfigurationRow> configurations;
+  std::vector<AuditRow> audit;
 
   [[nodiscard]] const VectorRow* Vector(SerialNumber serial) const;
 
@@ -49,6 +50,7 @@ class MemoryStore {
   void Keep(const MuteRow& row);
   void Keep(const NextMoveRow& row);
   void Keep(const ModelRow& row);
+  void Keep(const AuditRow& row) { audit.push_back(row); }
 
   std::set<std::uint64_t> model_entries_;
 };

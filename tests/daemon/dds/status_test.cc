@@ -239,7 +239,7 @@ TEST(Status, ACodeOutsideItsEnumIsNotWritten) {
 
 TEST(Status, ALaterVersionsCodeIsCountedNotShown) {
   auto reader = MakeReader();
-  auto participant = dds_internal::MakeParticipant(OwnDomain());
+  auto participant = dds_internal::MakeParticipant(OwnDomain(), "");
   ASSERT_TRUE(participant);
   const auto topic =
       dds_internal::MakeTopic(*participant, focalfleet_UnitStatus_desc, dds_internal::kUnitTopic);

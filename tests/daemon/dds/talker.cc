@@ -1,5 +1,5 @@
 // The talker publishes as a daemon does: units 1..N and alarms 1..A once. Then it prints `ready`
-// and stays until its stdin ends.   talker DOMAIN UNITS ALARMS
+// and stays until its stdin ends.   talker DOMAIN UNITS ALARMS [CREDENTIALS]
 #include <unistd.h>
 
 #include <cstdio>
@@ -12,9 +12,10 @@ namespace focalfleet {
 namespace {
 
 int Main(int argc, char** argv) {
-  if (argc != 4) return 2;
+  if (argc != 4 && argc != 5) return 2;
   DdsOptions options;
   options.domain = static_cast<std::uint32_t>(std::atoi(argv[1]));
+  if (argc == 5) options.security = argv[4];
   auto publisher = StatusPublisher::Create(options);
   if (!publisher) {
     std::fprintf(stderr, "%s\n", publisher.error().text.c_str());

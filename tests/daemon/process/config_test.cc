@@ -54,11 +54,22 @@ path = "s.db"
 keep_days = 400
 [control]
 socket = "c.sock"
+viewers = ["look", "2001"]
+operators = ["move"]
+engineers = ["root"]
 [dds]
 enabled = false
 domain = 7
 rate_hz = 2.5
 config = "c.xml"
+security = "keys"
+[http]
+address = "192.0.2.1"
+port = 443
+names = ["plate"]
+certificate = "p.crt"
+key = "p.key"
+tokens = "t.csv"
 [log]
 level = "debug"
 file = "l.log"
@@ -74,6 +85,7 @@ can_fd = true
 data_bit_rate_bps = 4000000
 unix_directory = "d"
 interfaces = ["can0", "can1"]
+opener = "o.sock"
 [sync]
 chip = "/dev/gpiochip3"
 line = 9
@@ -103,6 +115,18 @@ spread = "real"
   ASSERT_TRUE(config) << config.error().text;
   EXPECT_EQ(config->fleet.units, "/etc/ff/u.csv") << "relative to the file";
   EXPECT_EQ(config->fleet.clearance_mm, 0.25);
+  EXPECT_EQ(config->control.roles.viewers, (std::vector<std::string>{"look", "2001"}));
+  EXPECT_EQ(config->control.roles.operators, std::vector<std::string>{"move"});
+  EXPECT_EQ(config->control.roles.engineers, std::vector<std::string>{"root"});
+  EXPECT_EQ(config->control.roles_at, "/etc/ff/f.toml:13");
+  EXPECT_EQ(config->dds.security, "/etc/ff/keys");
+  EXPECT_EQ(config->http.address, "192.0.2.1");
+  EXPECT_EQ(config->http.port, 443u);
+  EXPECT_EQ(config->http.names, std::vector<std::string>{"plate"});
+  EXPECT_EQ(config->http.certificate, "/etc/ff/p.crt");
+  EXPECT_EQ(config->http.key, "/etc/ff/p.key");
+  EXPECT_EQ(config->http.tokens, "/etc/ff/t.csv");
+  EXPECT_EQ(config->bus.opener, "/etc/ff/o.sock");
   EXPECT_EQ(config->dds.domain, 7u);
   EXPECT_EQ(config->metrics.address, "::1");
   EXPECT_EQ(config->metrics.port, 9890u);
@@ -118,14 +142,27 @@ spread = "real"
   EXPECT_EQ(config->simulated.seed, 8u);
   EXPECT_FALSE(config->log.journal);
   EXPECT_EQ(config->store.keep_days, 400u);
-  EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:18");
-  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:30");
+  EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:29");
+  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:41");
   EXPECT_EQ(config->sync.chip, "/dev/gpiochip3");
   EXPECT_EQ(config->sync.line, 9u);
   EXPECT_TRUE(config->sync.active_low);
-  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:32");
+  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:44");
   EXPECT_TRUE(config->timing.sync_line);
   EXPECT_EQ(config->timing.sync_lead, Milliseconds(9));
+}
+
+TEST(Config, HttpFromElsewhereTakesTlsAndTokens) {
+  const std::string bus = "[bus]\nport = \"simulated\"\n[http]\n";
+  EXPECT_EQ(ParseConfig(kMinimal, "f.toml")->http.port, 0u) << "off";
+  EXPECT_TRUE(ParseConfig(bus + "port = 8080\n", "f.toml")) << "loopback";
+  for (const char* address : {"0.0.0.0", "192.0.2.1", "::", "2001:db8::1"})
+    EXPECT_THAT(ErrorOf(bus + "port = 8080\naddress = \"" + address + "\"\n"),
+                HasSubstr("that takes http.certificate and http.key"))
+        << address;
+  EXPECT_THAT(ErrorOf(bus + "port = 8080\nkey = \"k\"\n"), HasSubstr("belong together"));
+  EXPECT_THAT(ErrorOf(bus + "port = 8080\ntokens = \"\"\n"), HasSubstr("http.tokens"));
+  EXPECT_THAT(ErrorOf(bus + "address = \"localhost\"\n"), HasSubstr("numeric"));
 }
 
 TEST(Config, ASyncLineAsksForRealTimeAndAnEdgeWithinTheUnitsWindow) {

@@ -34,7 +34,7 @@ class RowSource {
 
  private:
   Row Next() {
-    switch (rng_.Below(14)) {
+    switch (rng_.Below(15)) {
       case 0:
         return VectorRow{.serial = Serial(),
                          .knowledge = {Knowledge(), Knowledge()},
@@ -109,6 +109,11 @@ class RowSource {
                             .state = Code(OpenAlarmRow::State::kOver)};
       case 12:
         return MuteRow{.name = Code(kLastAlarmName), .until_unix_ns = Place(), .reason = "r"};
+      case 13:
+        return AuditRow{.door = "socket",
+                        .name = "uid 1",
+                        .role = "viewer",
+                        .verb = std::string(Odd() ? 40 : 4, 'v')};
       default:
         return ModelRow{.entry = rng_.Below(40),
                         .sha256 = {},

@@ -5,7 +5,7 @@
 
 #include <map>
 
-#include "daemon/campaign/sha256.h"
+#include "daemon/access/sha256.h"
 #include "fleet/hex_layout.h"
 #include "tests/daemon/verbs/model_text.h"
 

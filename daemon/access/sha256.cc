@@ -1,4 +1,4 @@
-#include "daemon/campaign/sha256.h"
+#include "daemon/access/sha256.h"
 
 #include <array>
 #include <bit>

@@ -1,0 +1,25 @@
+// DDS as the configuration has it.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "daemon/dds/credential_watch.h"
+#include "daemon/dds/status_publisher.h"
+#include "daemon/process/config.h"
+#include "daemon/status/dds_troubles.h"
+
+namespace focalfleet {
+
+DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds);
+
+/// The log says that $CYCLONEDDS_URI is not read, where it is set.
+void WarnOfDdsEnvironment(const DaemonConfig::Dds& dds);
+
+/// Warnings of the watch go to `troubles`; `renew` makes participants anew. Null: there is no DDS
+/// Security. Both outlive the watch.
+std::unique_ptr<CredentialWatch> WatchCredentials(const DaemonConfig::Dds& dds,
+                                                  DdsTroubles* troubles,
+                                                  std::function<void()> renew);
+
+}  // namespace focalfleet
