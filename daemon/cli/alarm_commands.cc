@@ -181,7 +181,7 @@ void AddAlarmCommands(CommandLine* line) {
   CLI::App* alarms = AddCommand(
       &line->app, "alarms", "Show open alarms; acknowledge or mute them",
       "  focalfleet alarms\n  focalfleet alarms --all --since 12h\n"
-      "  focalfleet alarms ack 4711 UnitNeverBegan\n"
+      "  focalfleet alarms ack 12\n  focalfleet alarms ack UnitNeverBegan\n"
       "  focalfleet alarms mute UnitSilent --for 2h --reason 'rail 3 is off for repair'");
   alarms->require_subcommand(0, 1);
   auto listed = std::make_shared<ListOptions>();
@@ -196,7 +196,7 @@ void AddAlarmCommands(CommandLine* line) {
 
   CLI::App* ack =
       AddCommand(alarms, "ack", "Acknowledge open alarms: somebody has seen them and acts",
-                 "  focalfleet alarms ack 4711\n  focalfleet alarms ack UnitNeverBegan");
+                 "  focalfleet alarms ack 12\n  focalfleet alarms ack UnitNeverBegan");
   auto seen = std::make_shared<ChangeOptions>();
   ack->add_option("ALARM", seen->alarms, "Their ids, or names for all open ones of a name")
       ->required();

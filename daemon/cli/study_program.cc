@@ -58,10 +58,14 @@ std::optional<int> RunStudyProgram(int argc, char** argv) {
   Context context;
   context.LookAtTerminals();
   return static_cast<int>(Report(
-      context, {ErrorCode::kUnavailable,
-                fmt::format("{} is a command of the program focalfleet-study, which cannot be run: "
-                            "{} (looked for beside focalfleet, and in ../libexec/focalfleet)",
-                            word, std::strerror(reason))}));
+      context,
+      {ErrorCode::kUnavailable,
+       fmt::format("{} is a command of the program focalfleet-study, which {} (looked for "
+                   "beside focalfleet, and in ../libexec/focalfleet). In a clone "
+                   "`deploy/build --study` builds it; the package focalfleet has it",
+                   word,
+                   reason == ENOENT ? std::string("is not installed")
+                                    : fmt::format("cannot be run: {}", std::strerror(reason)))}));
 }
 
 }  // namespace

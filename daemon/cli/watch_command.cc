@@ -284,7 +284,8 @@ ExitCode ReportNoPublisher(const Context& context, const WatchOptions& options, 
        seen ? std::string("the daemon is gone from DDS")
             : fmt::format(
                   "no daemon publishes on DDS domain {} after {:.1f} s; is focalfleetd "
-                  "running with [dds] enabled, and is $CYCLONEDDS_URI here what its dds.config is?",
+                  "running with [dds] enabled, is its dds.domain this one (--domain), and is "
+                  "$CYCLONEDDS_URI here what its dds.config is?",
                   options.domain, options.wait_s)},
       seen ? ExitCode::kBroken : ExitCode::kNoDaemon);
 }

@@ -92,9 +92,12 @@ Check JudgeHealth(const Facts& facts, const StoreHealth& store) {
 
 void JudgeConfig(const Facts& facts, Checks* checks) {
   if (!facts.config) {
-    checks->push_back(Fail(
-        "configuration", facts.config.error().text,
-        fmt::format("mend it; focalfleetd --config {} --check reads it again", facts.config_path)));
+    checks->push_back(
+        Fail("configuration", facts.config.error().text,
+             fmt::format(
+                 "mend it (focalfleetd --config {} --check reads it again), or name the daemon's "
+                 "own by --config",
+                 facts.config_path)));
     return;
   }
   if (!facts.buses) {

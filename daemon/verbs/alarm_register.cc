@@ -94,7 +94,9 @@ Result<std::vector<Row>> AlarmRegister::Acknowledge(const std::vector<std::uint6
   };
   for (const std::uint64_t id : ids)
     if (!choose([id](const OpenAlarmRow& row) { return row.id == id; }))
-      return Fail(ErrorCode::kInvalid, "alarm " + std::to_string(id) + " is not open");
+      return Fail(ErrorCode::kInvalid, "alarm " + std::to_string(id) +
+                                           " is not open (`focalfleet alarms` has the numbers of "
+                                           "those that are; they are not those of units)");
   for (const std::string& text : names) {
     FOCALFLEET_TRY_ASSIGN(const AlarmName name, Known(text));
     if (!choose([name](const OpenAlarmRow& row) { return row.name == name; }))
