@@ -154,7 +154,7 @@ Result<std::vector<Token>> ReadTokens(const std::string& path) {
   const ssize_t got = regular ? ::pread(file, text.data(), text.size(), 0) : -1;
   ::close(file);
   if (!regular) return fail("no file");
-  if (got != static_cast<ssize_t>(status.st_size)) return fail("cannot be read as a whole");
+  if (got != status.st_size) return fail("cannot be read as a whole");
   if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0)
     return Fail(ErrorCode::kInvalid,
                 path + ": others than its owner may write it, and could make tokens: chmod go-w");

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kSha256Digits = 64;
 
 /// Each value with its name and length, so that no two rows have one text.
-class Canonical {
+class CanonicalEntry {
  public:
   void Add(const char* name, const std::string& value) {
     text_ += std::string(name) + " " + std::to_string(value.size()) + " " + value + "\n";
@@ -29,7 +29,7 @@ AuditHead BeforeAudit() { return {0, std::string(kSha256Digits, '0')}; }
 
 std::string ChainedSha256(const AuditEntry& entry) {
   const AuditRow& row = entry.row;
-  Canonical canonical;
+  CanonicalEntry canonical;
   canonical.Add("previous_sha256", entry.previous_sha256);
   canonical.Add("entry", entry.entry);
   canonical.Add("at_ns", std::to_string(entry.at.ns));

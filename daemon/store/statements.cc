@@ -159,7 +159,7 @@ Result<std::unique_ptr<Statements>> PrepareAll(Connection& connection) {
       {Sql::kSetMeta, kSetMeta},
       {Sql::kAddMeta, kAddMeta},
       {Sql::kAudit, kAuditInsert},
-      {Sql::kAuditHead, kAuditHead},
+      {Sql::kAuditHead, kAuditHeadSql},
   };
   static_assert(std::size(list) == kSqlCount);
   for (const auto& [which, text] : list) {
