@@ -81,7 +81,7 @@ Json JsonOf(const CandumpLine& line) {
   return object;
 }
 
-std::string TextOf(const CandumpLine& line) {
+std::string WordsOf(const CandumpLine& line) {
   std::string text = line.time.empty() ? "" : fmt::format("{}  ", line.time);
   text += fmt::format("{}  ", line.interface);
   if (line.foreign != nullptr) return text + fmt::format("not ours: {}\n", line.foreign);
@@ -128,7 +128,7 @@ void PrintGroup(const Context& context, const CandumpLine& line) {
     if (context.json)
       PrintJson(object);
     else
-      PrintText(TextOf(one));
+      PrintText(WordsOf(one));
   }
 }
 
@@ -201,7 +201,7 @@ Result<Tally> DecodeAll(const Context& context, const std::string& name, std::is
     else if (context.json)
       PrintJson(JsonOf(*parsed));
     else
-      PrintText(TextOf(*parsed));
+      PrintText(WordsOf(*parsed));
   }
   return tally;
 }

@@ -14,7 +14,7 @@ namespace focalfleet {
 namespace {
 
 DurationNs SinceStart() {
-  return {std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count()};
+  return {std::chrono::steady_clock::now().time_since_epoch().count()};
 }
 
 }  // namespace
