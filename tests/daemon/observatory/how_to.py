@@ -151,7 +151,7 @@ def broken_files():
                  ("wokCoords.csv", ",1,0,0,0,0,1", ",-1,0,0,0,0,1", ["its axes i, j are mirrored"]),
                  ("confSummary.par", "FIBERMAP 5 ", "FIBERMAP 5 5 ", ["confSummary.par:", "FIBERMAP: "])],
         "pfs": [("SC01.xml", "<Positioner_Id>2<", "<Positioner_Id>1<",
-                 ["SC01.xml:27: unit SC1 PID1: is there twice"]),
+                 ["SC01.xml:28: unit SC1 PID1: is there twice"]),
                 ("SC01.xml", "<Pixel_scale>90.0<", "<Pixel_scale>0<",
                  ["SC01.xml:4: column Link1_Link_Length: ", "is no length in mm"]),
                 ("fibres.csv", "2603", "2604", ["fibres.csv:3: column fiberId: 2604 is there twice"])],
