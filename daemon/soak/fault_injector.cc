@@ -285,7 +285,19 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
   if (site == kUnitDeaf || site == kUnitIgnores) deaf(row);
   if (site < kUnitSilent || site > kUnitSerialZero) return false;
   BeginWrongAnswers(site, unit);
-  Until(end, [faults] { *faults = {}; });
+  // Hardware is exchanged while it has no power.
+  const bool exchanged = site == kUnitForeign || site == kUnitSerialZero;
+  const auto power_cycle = [this, unit, row, exchanged] {
+    if (!exchanged) return;
+    parts_.troubles->shifted[row] = true;
+    parts_.plant->world().disturb().PowerCut(unit);
+    parts_.plant->world().disturb().PowerOn(unit);
+  };
+  power_cycle();
+  Until(end, [faults, power_cycle] {
+    *faults = {};
+    power_cycle();
+  });
   return true;
 }
 

@@ -38,7 +38,8 @@ namespace focalfleet::soak {
 
 class Judge {
  public:
-  Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles);
+  /// With a camera, places are only as exact as it sees them.
+  Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles, bool camera);
 
   // ---- what it sees
 
@@ -81,6 +82,7 @@ class Judge {
   const Plant* plant_;
   const MemoryDisk* disk_;
   const Troubles* troubles_;
+  double slack_vectors_ = 0;
   HostInstant now_{0};
   PictureReader reader_;
   std::optional<StoredPicture> durable_;

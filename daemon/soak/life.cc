@@ -146,7 +146,7 @@ void Life::MakeShell() {
 HostInstant Life::wake_at() {
   if (hall_->waits() || progressed_ || around_.plant->hears()) return clock_.Now();
   return std::min({shell_->wake_at(), writer_due_, planner_->due(), reader_->due(),
-                   around_.camera_due()});
+                   camera_ == nullptr ? kNever : camera_->due()});
 }
 
 void Life::Turn() {

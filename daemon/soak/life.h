@@ -13,6 +13,7 @@
 #include "daemon/soak/fault_sites.h"
 #include "daemon/soak/line_hall.h"
 #include "daemon/soak/memory_disk.h"
+#include "daemon/soak/night_camera.h"
 #include "daemon/soak/plant.h"
 #include "daemon/soak/timed_queue.h"
 #include "daemon/store/store.h"
@@ -46,8 +47,7 @@ struct Surroundings {
   std::function<void(const StoredFleet&, const CoordinatorConfig&)> starts;
   std::function<void(const Inputs&, const Effects&)> stepped;
   /// None: there is no camera.
-  std::function<std::unique_ptr<CameraQueue>()> camera;
-  std::function<HostInstant()> camera_due = [] { return kNever; };
+  std::function<std::unique_ptr<NightCamera>()> camera;
 };
 
 class Life {
@@ -94,7 +94,7 @@ class Life {
   std::unique_ptr<StatusScheduler> scheduler_;
   std::unique_ptr<TimedQueue<PlannerWork, PlanDone>> planner_;
   std::unique_ptr<TimedQueue<StoreQuestion, StoreAnswer>> reader_;
-  std::unique_ptr<CameraQueue> camera_;
+  std::unique_ptr<NightCamera> camera_;
   std::unique_ptr<Shell> shell_;
 };
 

@@ -34,7 +34,7 @@ Night::Night(const Draws& draws, const NightOptions& options)
   troubles_.deaf.assign(units, Troubles::kLongAgo);
   troubles_.units.assign(units, Troubles::kLongAgo);
   troubles_.shifted.assign(units, false);
-  judge_ = std::make_unique<Judge>(plant_.get(), disk_.get(), &troubles_);
+  judge_ = std::make_unique<Judge>(plant_.get(), disk_.get(), &troubles_, draws_.camera);
   faults_ = std::make_unique<FaultInjector>(
       FaultInjector::Parts{.draws = &draws_,
                            .plant = plant_.get(),
@@ -110,6 +110,14 @@ Surroundings Night::Around() {
     if (options_.log)
       options_.log(fmt::format("{:.6f} {}", 1e-9 * static_cast<double>(now_.ns), text));
   };
+  if (draws_.camera)
+    around.camera = [this] {
+      return std::make_unique<NightCamera>(NightCamera::Options{
+          .plant = plant_.get(),
+          .rng = faults_->rng(),
+          .happens = [this](FaultSite site) { return faults_->Happens(site, 50); },
+          .log = Around().log});
+    };
   return around;
 }
 

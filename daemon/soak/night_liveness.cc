@@ -77,10 +77,13 @@ void Night::SetRight() {
   const auto all = [](const UnitView&) { return true; };
   WaitFor(operators_->Ask("enable", {{"unit_ids", UnitsThat(all)}}), 30);
   Settle(kIdentifyS);
-  for (const std::uint32_t unit :
-       UnitsThat([](const UnitView& view) { return view.phase == UnitPhase::kForeign; }))
-    WaitFor(operators_->Ask("adopt", {{"unit_id", unit}}), 30);
-  Settle(kIdentifyS);
+  constexpr int kAdoptions = 3;
+  for (int n = 0; n < kAdoptions; ++n) {
+    for (const std::uint32_t unit :
+         UnitsThat([](const UnitView& view) { return view.phase == UnitPhase::kForeign; }))
+      WaitFor(operators_->Ask("adopt", {{"unit_id", unit}}), 30);
+    Settle(kIdentifyS);
+  }
   const auto lost = [this] {
     return UnitsThat([](const UnitView& unit) { return !IsPlace(unit.knowledge); });
   };

@@ -43,6 +43,8 @@ std::uint64_t Operators::Ask(const std::string& verb, Json args) {
   if (args.contains("unit_id")) open_[client].unit = UnitId{args["unit_id"].get<std::uint32_t>()};
   if (args.contains("unit_ids") && args["unit_ids"].size() == 1)
     open_[client].unit = UnitId{args["unit_ids"][0].get<std::uint32_t>()};
+  if (verb == "stop")
+    parts_.judge->StopOrdered(HostInstant{ReadVirtualNs()}, open_[client].unit);
   parts_.put(client, EncodeRequest({client, verb, std::move(args)}));
   return client;
 }

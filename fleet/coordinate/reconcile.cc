@@ -17,6 +17,11 @@ Reconciled AfterIntent(const UnitSays& unit, const IntentRow& intent) {
     return {InterruptedHull(intent, unit.subdivision), IntentEnd::kInterrupted,
             "power was lost in mid-move"};
   }
+  // FLASH gets the final vectors at the end of a motion. A unit that began and counts as where it
+  // began has lost its mark together with its power: it may stand anywhere on its way.
+  if (began && unit.position == intent.from && intent.from != intent.to)
+    return {InterruptedHull(intent, unit.subdivision), IntentEnd::kInterrupted,
+            "it counts from where its last move began, though it began"};
   if (began)
     return {Exactly(Witness::kReported, unit.position),
             unit.position == intent.to ? IntentEnd::kArrived : IntentEnd::kStopped};

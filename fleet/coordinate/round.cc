@@ -18,12 +18,12 @@ bool Round::HasParts() const {
 
 UnitPlan* Round::PlanOf(PositionerIndex i) {
   const std::size_t index = units_[i.value].plan;
-  return index == RoundUnit::kNoPlan ? nullptr : &plan.moves[index];
+  return index < plan.moves.size() ? &plan.moves[index] : nullptr;
 }
 
 const UnitPlan* Round::PlanOf(PositionerIndex i) const {
   const std::size_t index = units_[i.value].plan;
-  return index == RoundUnit::kNoPlan ? nullptr : &plan.moves[index];
+  return index < plan.moves.size() ? &plan.moves[index] : nullptr;
 }
 
 MoveId Round::MoveOf(PositionerIndex i) const {

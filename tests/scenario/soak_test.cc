@@ -55,6 +55,10 @@ TEST(SoakSummary, NamesFailedSeedsAndTakesEachOnce) {
   EXPECT_FALSE(summary.Take(Json{{"seed", 6}}));
 }
 
+TEST(Regression, Seed3_AMarkThatIsLostWithThePowerIsNotBelieved) { ExpectKept(3); }
+// A round kept a number of a plan that was over, and the daemon ended with it.
+TEST(Regression, Seed9_ANumberOfAPlanThatIsOverIsNoPlan) { ExpectKept(9); }
+
 // The judge's own parts must be able to see what they look for.
 
 StoreOptions On(const MemoryDisk& disk) { return {.vfs = disk.name(), .vfs_has_files = true}; }
