@@ -25,15 +25,15 @@ constexpr std::string_view kPrefix = "fft_";  // by which scanners find a token 
 
 bool IsTokenName(std::string_view name) {
   return !name.empty() && name.size() <= kNameBytes && std::ranges::all_of(name, [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           c == '-' || c == '.' || c == '_';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '.' || c == '_';
   });
 }
 
 bool IsSha256(std::string_view text) {
   return text.size() == 64 && std::ranges::all_of(text, [](char c) {
-    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
-  });
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
+         });
 }
 
 std::optional<std::int64_t> SecondsIn(std::string_view text) {
@@ -154,7 +154,7 @@ Result<std::vector<Token>> ReadTokens(const std::string& path) {
   const ssize_t got = regular ? ::pread(file, text.data(), text.size(), 0) : -1;
   ::close(file);
   if (!regular) return fail("no file");
-  if (got != static_cast<ssize_t>(status.st_size)) return fail("cannot be read as a whole");
+  if (got != status.st_size) return fail("cannot be read as a whole");
   if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0)
     return Fail(ErrorCode::kInvalid,
                 path + ": others than its owner may write it, and could make tokens: chmod go-w");

@@ -41,7 +41,7 @@ struct IncomingLine {
   std::string text;        // without its newline
   bool overtaken = false;  // an urgent line that came later was handed out before it
   bool reserved = false;   // its client has a reserved place: only urgent lines are to be handled
-  Caller caller = {};     // user and role of the client's process when it connected
+  Caller caller = {};      // user and role of the client's process when it connected
 };
 
 class LineServer {

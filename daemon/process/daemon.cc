@@ -224,8 +224,8 @@ void Daemon::OpenStatus() {
                      status_.troubles->Report(AlarmName::kDdsMissing, "status", trouble);
                    }},
       .renews = !config_.dds.security.empty()});
-  status_.credentials = WatchCredentials(config_.dds, status_.troubles.get(),
-                                         [this] { status_.publisher->Renew(); });
+  status_.credentials =
+      WatchCredentials(config_.dds, status_.troubles.get(), [this] { status_.publisher->Renew(); });
   status_.scheduler = std::make_unique<StatusScheduler>(
       layout_->size(),
       StatusScheduler::Options{

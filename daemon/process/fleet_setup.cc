@@ -8,6 +8,7 @@
 
 #include "daemon/files/text_file.h"
 #include "daemon/ports/simulated_port.h"
+#include "daemon/ports/socket_opener.h"
 #include "daemon/ports/unix_port.h"
 #include "fleet/files/fiducials_file.h"
 #include "fleet/files/layout_file.h"
@@ -122,6 +123,7 @@ Result<std::unique_ptr<FibreCarrierWorker>> OpenFibreCarriers(const DaemonConfig
 }
 
 Status CheckInterfaces(const DaemonConfig& config, const Layout& layout) {
+  TakeSocketsFrom(config.bus.opener);
   if (config.bus.port != PortKind::kSocketCan) return {};
   const std::size_t interfaces = config.bus.interfaces.size();
   if (interfaces != layout.buses().size())

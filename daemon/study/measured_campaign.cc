@@ -8,8 +8,8 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/campaign/campaign_files.h"
 #include "daemon/access/sha256.h"
+#include "daemon/campaign/campaign_files.h"
 #include "daemon/files/text_file.h"
 
 namespace focalfleet::cli {
