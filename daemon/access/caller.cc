@@ -8,8 +8,8 @@ std::string NameOf(const Caller& caller) {
 }
 
 std::string Describe(const Caller& caller) {
-  std::string text = NameOf(caller) + " (" +
-                     (caller.role == Role::kNone ? "without a role" : Name(caller.role));
+  std::string text =
+      NameOf(caller) + " (" + (caller.role == Role::kNone ? "without a role" : Name(caller.role));
   if (caller.peer) {
     text += ", pid " + std::to_string(caller.peer->pid);
     if (!caller.peer->program.empty()) text += ", " + caller.peer->program;

@@ -64,10 +64,9 @@ Status CheckRight(const Caller& caller, std::string_view verb, const nlohmann::j
   const bool flagged = right->flag_least > right->least && IsGiven(args, right->flag);
   const Role least = flagged ? right->flag_least : right->least;
   if (caller.role >= least) return {};
-  return Fail(ErrorCode::kRefused,
-              Describe(caller) + " may not " + right->verb +
-                  (flagged ? std::string(" with ") + right->flag : "") + ": it takes the role " +
-                  Name(least));
+  return Fail(ErrorCode::kRefused, Describe(caller) + " may not " + right->verb +
+                                       (flagged ? std::string(" with ") + right->flag : "") +
+                                       ": it takes the role " + Name(least));
 }
 
 nlohmann::json AccessJson(const Caller& caller) {

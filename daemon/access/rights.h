@@ -30,7 +30,8 @@ std::span<const Right> Rights();
 const Right* RightOf(std::string_view verb);
 
 /// The caller may use the verb with these arguments.
-/// Errors: kInvalid: there is no such verb; kRefused: names caller, verb and the role that it needs.
+/// Errors: kInvalid: there is no such verb; kRefused: names caller, verb and the role that it
+/// needs.
 Status CheckRight(const Caller& caller, std::string_view verb, const nlohmann::json& args);
 
 /// {name, door, role, verbs}: what the caller may do. A verb is {verb, changes, least, allowed},

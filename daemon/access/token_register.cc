@@ -17,8 +17,8 @@ constexpr std::int64_t kSecondNs = 1'000'000'000;
 bool AreEqual(std::string_view a, std::string_view b) {
   unsigned char differs = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
-    differs = static_cast<unsigned char>(differs | (static_cast<unsigned char>(a[i]) ^
-                                                    static_cast<unsigned char>(b[i])));
+    differs = static_cast<unsigned char>(
+        differs | (static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i])));
   return differs == 0;
 }
 
@@ -52,8 +52,7 @@ Result<TokenRegister::Found> TokenRegister::Find(std::string_view secret, WallTi
   return Found{found->name, found->role};
 }
 
-bool TokenRegister::Use(const Budget& budget, const std::string& name, WallTime now,
-                        Buckets* in) {
+bool TokenRegister::Use(const Budget& budget, const std::string& name, WallTime now, Buckets* in) {
   // Buckets that are full again tell nothing.
   if (in->size() >= kBuckets)
     std::erase_if(*in, [&](const auto& entry) {

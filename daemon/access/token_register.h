@@ -1,5 +1,5 @@
-// The tokens of the file, as the HTTP door looks them up: read anew when the file changes, so that a
-// revoked token is refused from the next request on. A file that cannot be read is a file without
+// The tokens of the file, as the HTTP door looks them up: read anew when the file changes, so that
+// a revoked token is refused from the next request on. A file that cannot be read is a file without
 // tokens.
 //
 // A comparison takes as long whatever the token: it goes over the hashes of all. Attempts without a

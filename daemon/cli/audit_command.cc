@@ -46,20 +46,17 @@ std::string DescribeEntry(const Json& entry, bool colour_on) {
   const bool taken = entry.value("taken", false);
   const std::uint64_t configuration = CountIn(entry, "configuration");
   const std::string reason = TextIn(entry, "reason");
-  return fmt::format("{}  {}  {}, {}  {}  {}{}{}", TextIn(entry, "at"), CountIn(entry, "entry"),
-                     WithLogin(entry), TextIn(entry, "role"),
-                     Paint(colour_on, Colour::kBold, TextIn(entry, "verb")),
-                     Paint(colour_on, taken ? Colour::kGreen : Colour::kRed,
-                           taken ? "taken" : "refused"),
-                     configuration == 0 ? "" : fmt::format(", configuration {}", configuration),
-                     reason.empty() ? "" : ": " + reason);
+  return fmt::format(
+      "{}  {}  {}, {}  {}  {}{}{}", TextIn(entry, "at"), CountIn(entry, "entry"), WithLogin(entry),
+      TextIn(entry, "role"), Paint(colour_on, Colour::kBold, TextIn(entry, "verb")),
+      Paint(colour_on, taken ? Colour::kGreen : Colour::kRed, taken ? "taken" : "refused"),
+      configuration == 0 ? "" : fmt::format(", configuration {}", configuration),
+      reason.empty() ? "" : ": " + reason);
 }
 
 Result<Json> ArgumentsFor(const AuditOptions& options) {
   if (options.verify) return Json{{"heads", options.heads}};
-  Json args{{"limit", options.limit},
-            {"name", CallerNamed(options.who)},
-            {"verb", options.verb}};
+  Json args{{"limit", options.limit}, {"name", CallerNamed(options.who)}, {"verb", options.verb}};
   const WallTime now = WallTime::Now();
   if (!options.since.empty()) {
     FOCALFLEET_TRY_ASSIGN(const WallTime since, InstantOf(options.since, now));
@@ -77,9 +74,9 @@ ExitCode ShowVerdict(const Context& context, const Json& verdict) {
   if (!verdict.value("whole", false))
     return Report(context, {ErrorCode::kInvalid, TextIn(verdict, "flaw")});
   if (context.json) PrintJson(verdict);
-  Say(context, fmt::format("the audit is whole: {}, head {}",
-                           Count(CountIn(verdict, "entries"), "entry", "entries"),
-                           TextIn(verdict, "head")));
+  Say(context,
+      fmt::format("the audit is whole: {}, head {}",
+                  Count(CountIn(verdict, "entries"), "entry", "entries"), TextIn(verdict, "head")));
   return ExitCode::kOk;
 }
 
@@ -120,11 +117,11 @@ ExitCode RunAudit(const Context& context, const AuditOptions& options) {
 }  // namespace
 
 void AddAuditCommand(CommandLine* line) {
-  CLI::App* audit = AddCommand(
-      &line->app, "audit", "Show who commanded what, and check that the record is whole",
-      "  focalfleet audit --since 12h\n  focalfleet audit --who maria --verb apply\n"
-      "  focalfleet audit --verify --head 4711:0f3a...\n"
-      "  focalfleet audit --verify --store /var/lib/focalfleet/focalfleet.db");
+  CLI::App* audit =
+      AddCommand(&line->app, "audit", "Show who commanded what, and check that the record is whole",
+                 "  focalfleet audit --since 12h\n  focalfleet audit --who maria --verb apply\n"
+                 "  focalfleet audit --verify --head 4711:0f3a...\n"
+                 "  focalfleet audit --verify --store /var/lib/focalfleet/focalfleet.db");
   auto options = std::make_shared<AuditOptions>();
   audit->add_option("--since", options->since, "Since then: 2h, or a time of UTC");
   audit->add_option("--until", options->until, "Until then: 2h, or a time of UTC");

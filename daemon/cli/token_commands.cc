@@ -165,9 +165,9 @@ void AddTokenCommands(CommandLine* line) {
                  "  focalfleet token list\n  focalfleet token revoke night-page");
   token->require_subcommand(1);
 
-  CLI::App* add = AddCommand(
-      token, "add", "Make a token and show it once. The file keeps its hash alone",
-      "  focalfleet token add night-page --role viewer --days 30");
+  CLI::App* add =
+      AddCommand(token, "add", "Make a token and show it once. The file keeps its hash alone",
+                 "  focalfleet token add night-page --role viewer --days 30");
   auto added = OptionsOf(add);
   add->add_option("NAME", added->name, "For the audit: letters, digits, - . _")->required();
   OneOf(add->add_option("--role", added->role, "What its bearer may do"),
@@ -182,8 +182,8 @@ void AddTokenCommands(CommandLine* line) {
                               "  focalfleet token list --file tokens.csv");
   OnChosen(line, list, OptionsOf(list), RunTokenList);
 
-  CLI::App* revoke = AddCommand(token, "revoke", "End a token now",
-                                "  focalfleet token revoke night-page");
+  CLI::App* revoke =
+      AddCommand(token, "revoke", "End a token now", "  focalfleet token revoke night-page");
   auto revoked = OptionsOf(revoke);
   revoke->add_option("NAME", revoked->name, "The token's name")->required();
   OnChosen(line, revoke, revoked, RunTokenRevoke);

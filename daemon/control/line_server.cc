@@ -141,7 +141,8 @@ bool LineServer::Impl::AcceptOne() {
   else if (Taken(true) < options_.reserved_max || DropIdlest(true))
     Admit(fd, std::move(caller), true);
   else
-    ReportAndClose(fd, ErrorCode::kFull, "too many clients at " + path() + ", and none of them is idle");
+    ReportAndClose(fd, ErrorCode::kFull,
+                   "too many clients at " + path() + ", and none of them is idle");
   return true;
 }
 

@@ -1,9 +1,9 @@
 // A UNIX stream socket that listens at a path.
 //
-// Owner and group may connect, unless another mode is given. A socket file that a live server answers on is refused
-// as in use. A file that no process answers on was left by a crash and is replaced. The new socket
-// listens under a temporary name and is renamed into place, so no client ever finds a socket file
-// that does not answer.
+// Owner and group may connect, unless another mode is given. A socket file that a live server
+// answers on is refused as in use. A file that no process answers on was left by a crash and is
+// replaced. The new socket listens under a temporary name and is renamed into place, so no client
+// ever finds a socket file that does not answer.
 #pragma once
 
 #include <sys/types.h>

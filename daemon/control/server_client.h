@@ -14,8 +14,8 @@ namespace focalfleet {
 
 struct ServerClient {
   int fd = -1;
-  bool reserved = false;                   // its place is one of the reserved ones
-  Caller caller = {};                      // user and role of its process
+  bool reserved = false;     // its place is one of the reserved ones
+  Caller caller = {};        // user and role of its process
   std::uint64_t active = 0;  // the server's count when it was last accepted, heard or answered
   LineBuffer input;
   std::string output;

@@ -1,5 +1,5 @@
-// A thread that looks at the credentials of DDS Security: it warns before one of them ends, and asks
-// for new participants when the files have changed.
+// A thread that looks at the credentials of DDS Security: it warns before one of them ends, and
+// asks for new participants when the files have changed.
 #pragma once
 
 #include <chrono>

@@ -121,8 +121,8 @@ std::string CredentialState(const std::string& folder) {
     struct stat status {};
     if (::stat((folder + "/" + name).c_str(), &status) != 0) status = {};
     state += std::to_string(status.st_ino) + " " + std::to_string(status.st_size) + " " +
-             std::to_string(status.st_mtim.tv_sec) + "." +
-             std::to_string(status.st_mtim.tv_nsec) + "\n";
+             std::to_string(status.st_mtim.tv_sec) + "." + std::to_string(status.st_mtim.tv_nsec) +
+             "\n";
   }
   return state;
 }
@@ -141,10 +141,10 @@ std::optional<ShellNote> CredentialClock::Look(const std::vector<CredentialEnd>&
   const std::string which = first.what + " of DDS Security";
   const std::string when = ToIso8601({first.at_s * 1'000'000'000});
   if (stage == static_cast<int>(kStages.size()))
-    return ShellNote{AlarmName::kDdsCredentialsEnded,
-                     which + " ended at " + when +
-                         ": DDS has cut this daemon off, and nothing is published",
-                     AlarmName::kDdsCredentialsEnding};
+    return ShellNote{
+        AlarmName::kDdsCredentialsEnded,
+        which + " ended at " + when + ": DDS has cut this daemon off, and nothing is published",
+        AlarmName::kDdsCredentialsEnding};
   if (stage > before || (was_over && stage > 0))
     return ShellNote{AlarmName::kDdsCredentialsEnding,
                      which + " ends in " + TimeLeft(left_s) + ", at " + when + ": renew it",

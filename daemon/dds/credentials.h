@@ -26,7 +26,7 @@ namespace focalfleet {
 std::vector<std::pair<std::string, std::string>> SecurityProperties(const std::string& folder);
 
 struct CredentialEnd {
-  std::string what;  // the file
+  std::string what;       // the file
   std::int64_t at_s = 0;  // since 1970
   bool operator==(const CredentialEnd&) const = default;
 };
@@ -38,7 +38,7 @@ Result<std::vector<CredentialEnd>> ReadCredentialEnds(const std::string& folder)
 /// The soonest `not_after` of permissions. Errors: kInvalid: there is none, or no time.
 Result<std::int64_t> EndOfPermissions(std::string_view text);
 
-/// What tells one state of the files from another: their identities and times of change.
+/// A text that differs where the files differ, by their identities and times of change.
 std::string CredentialState(const std::string& folder);
 
 /// Warns 14 days, 1 day and 1 hour before the end, and at the end; each once.

@@ -17,7 +17,8 @@ class StatusReader::Impl {
     auto impl = std::make_unique<Impl>();
     FOCALFLEET_TRY_ASSIGN(impl->domain_,
                           Domain::Acquire(options.dds.domain, options.dds.config_xml));
-    FOCALFLEET_TRY_ASSIGN(impl->participant_, MakeParticipant(options.dds.domain, options.dds.security));
+    FOCALFLEET_TRY_ASSIGN(impl->participant_,
+                          MakeParticipant(options.dds.domain, options.dds.security));
     const dds_entity_t waitset = dds_create_waitset(impl->participant_.get());
     if (waitset < 0) return DdsFailure("make a waitset", waitset);
     impl->waitset_ = waitset;

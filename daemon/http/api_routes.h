@@ -1,5 +1,5 @@
-// The verbs of the daemon over HTTP: POST /api/VERB with the arguments as a JSON object, answered by
-// the result. A request goes on to the control socket on behalf of its token, so that both doors
+// The verbs of the daemon over HTTP: POST /api/VERB with the arguments as a JSON object, answered
+// by the result. A request goes on to the control socket on behalf of its token, so that both doors
 // have one way in, one table of rights and one audit.
 //
 //   200 the result    400 invalid    403 the role does not suffice    409 refused now

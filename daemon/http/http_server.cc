@@ -163,8 +163,7 @@ class Connection final : public httplib::Stream {
 
   bool Send(const char* data, std::size_t size, Clock::time_point until) {
     for (std::size_t sent = 0; sent < size;) {
-      const std::size_t count =
-          Move(until, [&] { return bytes_->Send(data + sent, size - sent); });
+      const std::size_t count = Move(until, [&] { return bytes_->Send(data + sent, size - sent); });
       if (count == 0) return false;
       sent += count;
     }

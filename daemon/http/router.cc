@@ -73,10 +73,8 @@ std::optional<HttpAnswer> HttpRouter::Authenticate(const HttpRequest& request,
     options_.log("http: a token is refused, from " + request.address + ": " + found.error().text);
     return Unauthorized("the token is not valid");  // the reason is for the log alone
   }
-  *caller = {.role = found->role,
-             .door = Door::kHttp,
-             .token = found->name,
-             .address = request.address};
+  *caller = {
+      .role = found->role, .door = Door::kHttp, .token = found->name, .address = request.address};
   if (route.verb != "stop" && !tokens.MayAsk(found->name, now))
     return TooMany("too many requests of this token");
   const Status right = CheckRight(*caller, route.verb, nlohmann::json::object());

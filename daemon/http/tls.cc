@@ -26,8 +26,7 @@ std::string Reason() {
 
 }  // namespace
 
-ByteStream::ByteStream(int socket, ssl_ctx_st* context)
-    : socket_(socket), tls_(SSL_new(context)) {
+ByteStream::ByteStream(int socket, ssl_ctx_st* context) : socket_(socket), tls_(SSL_new(context)) {
   if (tls_ == nullptr) return;
   SSL_set_fd(tls_, socket);
   SSL_set_accept_state(tls_);  // the first read shakes hands

@@ -13,6 +13,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "daemon/ports/socket_opener.h"
+
 namespace focalfleet {
 namespace {
 
@@ -145,7 +147,7 @@ Result<Head> ReadHead(std::span<const std::byte> answer) {
 // ---- Exchange with the kernel
 
 Result<NetlinkMessage> AskKernel(const NetlinkMessage& request) {
-  const int fd = ::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE);
+  const int fd = MakeSocket(SocketKind::kNetlink);
   if (fd < 0)
     return Fail(ErrorCode::kUnavailable, std::string("no netlink: ") + std::strerror(errno));
   NetlinkMessage answer(kAnswerMax);

@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "daemon/ports/can_errors.h"
+#include "daemon/ports/socket_opener.h"
 #include "protocol/wire/stage_group.h"
 
 namespace focalfleet {
@@ -69,7 +70,7 @@ Status Configure(int fd, const Listening& listening, bool confirms) {
 
 Result<OpenedInterface> OpenInterface(const std::string& name, const Listening& listening) {
   FOCALFLEET_TRY(QuestionAboutLink(name));
-  const int fd = ::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
+  const int fd = MakeSocket(SocketKind::kCan);
   if (fd < 0)
     return Fail(ErrorCode::kUnavailable,
                 "this kernel offers no SocketCAN (for '" + name + "'): " + std::strerror(errno));

@@ -38,8 +38,8 @@ struct DaemonConfig {
   struct Dds {
     bool enabled = true;
     std::uint32_t domain = 0;
-    double rate_hz = 10;  // limit of how often the status of changed units is published
-    std::string config;   // Cyclone's XML file; empty: loopback only
+    double rate_hz = 10;   // limit of how often the status of changed units is published
+    std::string config;    // Cyclone's XML file; empty: loopback only
     std::string security;  // folder of credentials for DDS Security; empty: without
   } dds;
   struct Log {

@@ -21,8 +21,7 @@ DurationNs SinceStart() {
 
 Result<RoleGroups> FindRoles(const DaemonConfig::Control& control) {
   auto groups = RoleGroups::Find(control.roles, ::geteuid());
-  if (!groups)
-    return Fail(groups.error().code, control.roles_at + ": " + groups.error().text);
+  if (!groups) return Fail(groups.error().code, control.roles_at + ": " + groups.error().text);
   return groups;
 }
 

@@ -31,9 +31,10 @@ std::unique_ptr<CredentialWatch> WatchCredentials(const DaemonConfig::Dds& dds,
             spdlog::info("DDS: new credentials, a new participant joins beside the old one");
             renew();
           },
-      .tell = [](const std::string& trouble) {
-        spdlog::error("DDS: the credentials cannot be read: {}", trouble);
-      }});
+      .tell =
+          [](const std::string& trouble) {
+            spdlog::error("DDS: the credentials cannot be read: {}", trouble);
+          }});
 }
 
 }  // namespace focalfleet

@@ -8,6 +8,7 @@
 
 #include "daemon/files/text_file.h"
 #include "daemon/ports/simulated_port.h"
+#include "daemon/ports/socket_opener.h"
 #include "daemon/ports/unix_port.h"
 #include "daemon/tables/read_table.h"
 #include "fleet/files/fiducials_file.h"
@@ -123,6 +124,7 @@ Result<std::unique_ptr<FibreCarrierWorker>> OpenFibreCarriers(const DaemonConfig
 }
 
 Status CheckInterfaces(const DaemonConfig& config, const Layout& layout) {
+  TakeSocketsFrom(config.bus.opener);
   if (config.bus.port != PortKind::kSocketCan) return {};
   const std::size_t interfaces = config.bus.interfaces.size();
   if (interfaces != layout.buses().size())

@@ -1,7 +1,7 @@
 // A publisher of status whose participant of DDS can be made anew without a gap, as new credentials
-// ask for. The new participant joins beside the old one and gets the whole state. Both publish until
-// readers have surely found the new one, then the old one leaves. A new one that cannot join keeps
-// trying, and the old one stays.
+// ask for. The new participant joins beside the old one and gets the whole state. Both publish
+// until readers have surely found the new one, then the old one leaves. A new one that cannot join
+// keeps trying, and the old one stays.
 #pragma once
 
 #include <atomic>
@@ -58,7 +58,7 @@ class RenewingStatusPublisher {
 
   Options options_;
   std::unique_ptr<BufferedStatusPublisher> current_;
-  std::unique_ptr<BufferedStatusPublisher> next_;  // none: no renewal is under way
+  std::unique_ptr<BufferedStatusPublisher> next_;                   // none: no renewal is under way
   std::optional<std::chrono::steady_clock::time_point> joined_at_;  // of next_
   Latest<UnitStatusValue> units_;
   Latest<UnitOrientationValue> orientations_;

@@ -1,6 +1,6 @@
 // The chain of the audit: each entry's SHA-256 covers all its columns and the SHA-256 of the entry
-// before it. A changed, inserted or missing entry breaks the chain from there on. A tail that is cut
-// off breaks nothing, so heads of the chain are also told to places outside of the store.
+// before it. A changed, inserted or missing entry breaks the chain from there on. A tail that is
+// cut off breaks nothing, so heads of the chain are also reported outside of the store.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ struct AuditHead {
   bool operator==(const AuditHead&) const = default;
 };
 
-/// What is before the first entry.
+/// The place before the first entry.
 AuditHead BeforeAudit();
 
 /// The hash of the entry, over its number, time, row and `previous_sha256`.
@@ -40,7 +40,7 @@ std::string ChainedSha256(const AuditEntry& entry);
 std::optional<AuditHead> HeadOf(const std::string& text);
 std::string Text(const AuditHead& head);
 
-/// What a check of the whole chain found.
+/// The finding of a check of the whole chain.
 struct AuditVerdict {
   std::uint64_t entries = 0;
   AuditHead head;

@@ -33,7 +33,7 @@ Result<std::vector<AuditEntry>> StoreReader::Audit(const AuditFilter& filter) {
 Result<AuditVerdict> StoreReader::CheckAudit(const std::vector<AuditHead>& heads) {
   std::multimap<std::uint64_t, std::string> known;
   for (const AuditHead& head : heads) known.emplace(head.entry, head.sha256);
-  // One transaction, so that the count fits the rows.
+  // A single transaction, so that the count fits the rows.
   connection_->Rollback();
   FOCALFLEET_TRY(connection_->Execute("BEGIN"));
   auto verdict = CheckChain(*connection_, known);

@@ -100,7 +100,7 @@ Result<AuditVerdict> CheckChain(Connection& connection,
     const auto [first, last] = known.equal_range(entry.entry);
     for (auto it = first; it != last; ++it)
       if (flaw.empty() && it->second != entry.sha256)
-        flaw = "its hash is not the one that was told outside";
+        flaw = "its hash is not the one that was reported outside";
     if (!flaw.empty()) {
       verdict.flaw = "audit entry " + std::to_string(entry.entry) + ": " + flaw;
       return verdict;
@@ -112,8 +112,9 @@ Result<AuditVerdict> CheckChain(Connection& connection,
                         connection.Integer("SELECT coalesce((SELECT value FROM meta WHERE key = "
                                            "'audit_entries' AND checksum = row_checksum(key, "
                                            "value)), -1)"));
-  const auto told = known.empty() ? 0 : known.rbegin()->first;
-  if (counted < 0 || static_cast<std::uint64_t>(counted) != verdict.entries || told > verdict.entries)
+  const auto reported = known.empty() ? 0 : known.rbegin()->first;
+  if (counted < 0 || static_cast<std::uint64_t>(counted) != verdict.entries ||
+      reported > verdict.entries)
     verdict.flaw = "the audit ends at entry " + std::to_string(verdict.entries) +
                    ", and there were more: its tail was cut off";
   return verdict;

@@ -68,7 +68,7 @@ class StoreReader {
   /// The newest first.
   Result<std::vector<AuditEntry>> Audit(const AuditFilter& filter);
   /// The chain of the audit from its first entry to its last one, and whether `heads` that were
-  /// told outside are part of it. Cost: some 10 us an entry.
+  /// reported outside are part of it. Cost: some 10 us an entry.
   Result<AuditVerdict> CheckAudit(const std::vector<AuditHead>& heads);
   /// Queries end with kUnavailable once `ending` is true. Pre: `ending` outlives them.
   void EndWith(const std::atomic<bool>* ending);

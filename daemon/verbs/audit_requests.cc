@@ -18,8 +18,8 @@ Result<std::vector<AuditHead>> HeadsArgument(const Json& args) {
   const auto list = args.find("heads");
   if (list == args.end()) return heads;
   if (!list->is_array() || list->size() > kHeadsMax)
-    return Fail(ErrorCode::kInvalid, "argument 'heads' must be a list of texts, at most " +
-                                         std::to_string(kHeadsMax));
+    return Fail(ErrorCode::kInvalid,
+                "argument 'heads' must be a list of texts, at most " + std::to_string(kHeadsMax));
   for (const Json& text : *list) {
     const auto head = text.is_string() ? HeadOf(text.get<std::string>()) : std::nullopt;
     if (!head)

@@ -1,5 +1,5 @@
-// The requests about the audit: what was commanded or refused and by whom, and whether the record of
-// it is whole.
+// The requests about the audit: what was commanded or refused and by whom, and whether the record
+// of it is whole.
 #pragma once
 
 #include "daemon/control/messages.h"
@@ -18,7 +18,7 @@ Json AuditJson(const AuditVerdict& verdict);
 /// verb?, limit?}. Errors: kInvalid; those of the store.
 Result<StoreReading> AskAudit(const ControlRequest& request);
 /// The answer to `audit_check`: the whole chain is followed. Arguments: {heads?}, texts of heads
-/// that were told outside. Errors: as AskAudit.
+/// that were reported outside. Errors: as AskAudit.
 Result<StoreReading> AskAuditCheck(const ControlRequest& request);
 
 }  // namespace focalfleet

@@ -1,4 +1,4 @@
-// What is kept of commands: who gave which one by which door, and whether it was taken. A command's
+// The trail of commands: who gave which one by which door, and whether it was taken. A command's
 // entry goes to the store in the transaction of the command's own first rows, so neither is there
 // without the other. Refusals are kept, too. Questions are not.
 //

@@ -160,9 +160,9 @@ TEST_F(AuditTest, ACutTailIsFound) {
   EXPECT_THAT(Flaw(), HasSubstr("its tail was cut off"));
 }
 
-TEST_F(AuditTest, ACutTailWithItsCountIsFoundByAHeadToldOutside) {
+TEST_F(AuditTest, ACutTailWithItsCountIsFoundByAHeadReportedOutside) {
   Fill();
-  const AuditHead told = Check().head;
+  const AuditHead reported = Check().head;
   Forge("DELETE FROM audit WHERE entry > 3");
   // The forger knows the program and makes the count fit, as the store itself would.
   {
@@ -173,13 +173,13 @@ TEST_F(AuditTest, ACutTailWithItsCountIsFoundByAHeadToldOutside) {
                                       "WHERE key = 'audit_entries'"));
   }
   EXPECT_EQ(Flaw(), "") << "the file alone cannot show it";
-  EXPECT_THAT(Check({told}).flaw.value_or(""), HasSubstr("its tail was cut off"));
+  EXPECT_THAT(Check({reported}).flaw.value_or(""), HasSubstr("its tail was cut off"));
 }
 
-TEST_F(AuditTest, AChainThatWasMadeAnewIsFoundByAHeadToldOutside) {
+TEST_F(AuditTest, AChainThatWasMadeAnewIsFoundByAHeadReportedOutside) {
   Fill();
-  const AuditHead told{4, std::string(64, '7')};
-  EXPECT_THAT(Check({told}).flaw.value_or(""), HasSubstr("not the one that was told outside"));
+  const AuditHead reported{4, std::string(64, '7')};
+  EXPECT_THAT(Check({reported}).flaw.value_or(""), HasSubstr("not the one that was reported outside"));
 }
 
 TEST_F(AuditTest, HeadsAreTexts) {
