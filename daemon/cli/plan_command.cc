@@ -124,6 +124,13 @@ const char* WordOf(Objective objective) {
   return kWords[static_cast<std::size_t>(objective)];
 }
 
+/// The two units that set the bound of pairs; null: the slowest unit alone sets it.
+Json PairBoundByJson(const Planned& planned) {
+  if (!planned.plan.pair_bound_by) return nullptr;
+  const auto id = [&](PositionerIndex unit) { return planned.fleet.layout.unit(unit).id.value; };
+  return {id(planned.plan.pair_bound_by->first), id(planned.plan.pair_bound_by->second)};
+}
+
 Json Summary(const Planned& planned, const PlanCommandOptions& options) {
   Json rails = Json::array();
   for (const RailStatement& rail : planned.power.rails)
@@ -138,6 +145,8 @@ Json Summary(const Planned& planned, const PlanCommandOptions& options) {
           {"unserved", UnservedJson(planned.plan, planned.fleet.layout)},
           {"makespan_s", planned.estimate.makespan_s},
           {"bound_s", planned.plan.bound_s},
+          {"pair_bound_s", planned.plan.pair_bound_s},
+          {"pair_bound_by", PairBoundByJson(planned)},
           {"sectors", planned.sectors},
           {"guarantee", GuaranteeJson(planned, options.plan)},
           {"energy_J", planned.estimate.energy_J},
@@ -184,6 +193,12 @@ std::string Describe(const Json& summary) {
       summary["targeted"].get<std::uint64_t>(), summary["rows"].get<std::uint64_t>(),
       number("makespan_s"), number("bound_s"), number("energy_J"), number("peak_power_W"),
       number("peak_power_most_W"), number("flatness"));
+  const Json& pair = summary["pair_bound_by"];
+  const std::string together =
+      pair.is_null() ? ""
+                     : fmt::format("\n  units {} and {} need {:.2f} s at least, whatever others do",
+                                   pair[0].get<std::uint32_t>(), pair[1].get<std::uint32_t>(),
+                                   number("pair_bound_s"));
   const std::string plot =
       summary["plot"].is_null()
           ? ""
@@ -191,7 +206,7 @@ std::string Describe(const Json& summary) {
   const auto sectors = summary["sectors"].get<std::uint32_t>();
   const std::string parts =
       sectors > 1 ? fmt::format("\n  planned by {} sectors", sectors) : std::string();
-  return text + parts + DescribeGuarantee(summary["guarantee"]) + plot +
+  return text + together + parts + DescribeGuarantee(summary["guarantee"]) + plot +
          DescribeUnserved(summary["unserved"]);
 }
 
@@ -263,6 +278,10 @@ void AddPlanCommand(CommandLine* line) {
   AddTunedStore(command, &options->store);
   command->add_flag("--fixed", options->plan.fixed,
                     "Units that no target names may not step aside");
+  command
+      ->add_option("--improve-cpu-s", options->plan.improve_cpu_s,
+                   "Processor time for an earlier end on a dense plate, s")
+      ->check(CLI::Range(0.0, 3600.0));
   command
       ->add_option("--rail-limit-w", options->plan.power.rail_W,
                    "No supply rail gives more at any instant, W")

@@ -33,16 +33,6 @@ constexpr int kAttemptsAlone = 3;
 constexpr int kAttemptsWithNotice = 3;  // then the pair need not be clear with notice
 constexpr float kApart = 1e6F;          // weight of a neighbour that must not be met
 
-/// The way leads from the unit's start to its target.
-bool Reaches(const LocalSearchRequest& q, std::uint32_t unit, const AxisPaths& paths) {
-  for (std::size_t k = 0; k < kAxisCount; ++k) {
-    std::int32_t at = q.from[unit][k];
-    for (const Segment& segment : paths[k].segments()) at += segment.delta;
-    if (at != q.to[unit][k]) return false;
-  }
-  return true;
-}
-
 /// The search itself: which unit looks for another way next, and how far it goes for one.
 class LocalSearch {
  public:
@@ -382,6 +372,15 @@ LocalSearchResult LocalSearch::Run() {
 }
 
 }  // namespace
+
+bool Reaches(const LocalSearchRequest& q, std::uint32_t unit, const AxisPaths& paths) {
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    std::int32_t at = q.from[unit][k];
+    for (const Segment& segment : paths[k].segments()) at += segment.delta;
+    if (at != q.to[unit][k]) return false;
+  }
+  return true;
+}
 
 LocalSearchResult SearchLocally(const LocalSearchRequest& request) {
   return LocalSearch(request).Run();

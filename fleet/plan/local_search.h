@@ -51,6 +51,9 @@ struct LocalSearchRequest {
   Abandoned abandoned = {};  // once true, no unit looks for another way
 };
 
+/// The paths lead from the unit's start to its target.
+bool Reaches(const LocalSearchRequest& request, std::uint32_t unit, const AxisPaths& paths);
+
 /// A motion for every unit of the request, straight wherever that is clear. Cost: O(n) for bounded
 /// neighbourhoods; a unit without conflicts costs one test for each neighbour.
 LocalSearchResult SearchLocally(const LocalSearchRequest& request);

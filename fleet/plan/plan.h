@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fleet/drive.h"
@@ -81,6 +82,10 @@ struct Plan {
   std::string too_near;
   double makespan_s = 0;  // start signal to the last vector, by nominal clocks
   double bound_s = 0;     // no plan can be shorter: the slowest unit's shortest move alone
+  /// No plan can be shorter either: the least time in which these two neighbours get there together,
+  /// whatever all others do. Where no pair needs more than the slowest unit: that unit's time.
+  double pair_bound_s = 0;
+  std::optional<std::pair<PositionerIndex, PositionerIndex>> pair_bound_by;
   /// With PlanOptions::stall_tolerant: when each stage begins; the places of all units must be
   /// measured before. Seconds after the start signal.
   std::vector<double> stages_s;

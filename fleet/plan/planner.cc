@@ -5,10 +5,12 @@
 #include <iterator>
 
 #include "fleet/plan/bounds.h"
+#include "fleet/plan/dense_search.h"
 #include "fleet/plan/guarantee.h"
 #include "fleet/plan/in_cell_planner.h"
 #include "fleet/plan/local_search.h"
 #include "fleet/plan/objective.h"
+#include "fleet/plan/pair_bound.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/schedule.h"
 #include "fleet/plan/sequential_planner.h"
@@ -26,12 +28,15 @@ constexpr std::size_t kTightest = 20;  // pairs that Plan::tightest lists
 /// Repeats with other random numbers, without limits of power.
 constexpr std::uint64_t kFreshStarts = 3;
 constexpr double kLongGiven = 1.02;  // times the bound: given motions up to here do not lengthen it
+constexpr double kNearBound = 1.03;  // times the bound
 /// Share of the time beyond which power takes the time, and rails are full.
 constexpr double kFullShare = 0.75;
 constexpr double kSlackMost = 2;  // times the bound that limits of power may take
-/// With more neighbours than this on average a unit hardly ever finds all others out of its way: an
-/// order is found sooner.
+/// With more neighbours than this on average a unit hardly ever finds all others out of its way:
+/// many are planned anew together.
 constexpr double kDenseNeighbours = 10;
+/// The first plan of a dense plate ends by this, times the bound.
+constexpr double kDenseWithin = 1.25;
 
 std::vector<Pose> StartsOf(const PlanRequest& request) {
   std::vector<Pose> starts;
@@ -52,7 +57,8 @@ class Planner {
         service_(request, scene_, start_),
         aside_(scene_.size(), 0),
         by_itself_(scene_.size(), 0),
-        hopeful_(scene_.size(), 0) {}
+        hopeful_(scene_.size(), 0),
+        dense_(MeanNeighbours() > kDenseNeighbours) {}
 
   Result<Plan> Run();
   [[nodiscard]] Status Check() const;
@@ -71,6 +77,7 @@ class Planner {
   void PlanOfLocalSearch();
   void TracksOfPlan();
   void ServeTheRest();
+  void FindBounds();
   Plan Finish();
 
   const PlanRequest& request_;
@@ -87,7 +94,8 @@ class Planner {
   std::vector<std::uint8_t> movers_;
   std::vector<std::uint32_t> stuck_;
   std::vector<std::uint32_t> stuck_for_order_;  // given up though a way exists
-  LocalSearchResult local_search_;              // tracks of plan_
+  bool dense_ = false;
+  LocalSearchResult local_search_;  // tracks of plan_
   Plan plan_;
 };
 
@@ -256,18 +264,22 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
       if (slack == 0) slack = power_s > kFullShare * within_s ? 1.3 : 1.02;
       within_s = std::min(std::max(within_s, power_s) * slack, kOffsetMaxS);
     }
-    local_search_ = SearchLocally({.scene = &scene_,
-                                   .drives = request_.drives,
-                                   .from = start_,
-                                   .to = service_.goals(),
-                                   .movable = may_move,
-                                   .begin_with = paths,
-                                   .given = request_.given,
-                                   .ledger = ledger ? &*ledger : nullptr,
-                                   .tolerance = tolerance,
-                                   .within_s = within_s,
-                                   .seed = options_.seed + fresh_starts,
-                                   .abandoned = options_.abandoned});
+    const LocalSearchRequest search{.scene = &scene_,
+                                    .drives = request_.drives,
+                                    .from = start_,
+                                    .to = service_.goals(),
+                                    .movable = may_move,
+                                    .begin_with = paths,
+                                    .given = request_.given,
+                                    .ledger = ledger ? &*ledger : nullptr,
+                                    .tolerance = tolerance,
+                                    .within_s = within_s,
+                                    .seed = options_.seed + fresh_starts,
+                                    .abandoned = options_.abandoned};
+    local_search_ =
+        dense_
+            ? SearchDense(search, {.within = kDenseWithin, .improve_cpu_s = options_.improve_cpu_s})
+            : SearchLocally(search);
     if (local_search_.starved) break;
     if (local_search_.in_conflict.empty()) {
       PlanOfLocalSearch();
@@ -338,7 +350,8 @@ void Planner::TracksOfPlan() {
       if (i < near.unit) local_search_.without_notice.emplace_back(i, near.unit);
 }
 
-/// Plans units that found no turn in the order among the others as these are planned.
+/// Plans units that found no turn in the order among the others as these are planned. On a dense
+/// plate all end sooner then.
 void Planner::ServeTheRest() {
   const Service before = service_;
   const Plan ordered = plan_;
@@ -348,6 +361,20 @@ void Planner::ServeTheRest() {
   if (AllAtOnce(paths)) return;
   service_ = before;
   plan_ = ordered;
+}
+
+/// Where the plan ends soon after the slowest unit alone, no pair is worth a look.
+void Planner::FindBounds() {
+  plan_.bound_s = TimeBoundS(service_);
+  plan_.pair_bound_s = plan_.bound_s;
+  plan_.pair_bound_by.reset();
+  if (plan_.makespan_s <= kNearBound * plan_.bound_s) return;
+  std::vector<double> end_s(scene_.size(), 0);
+  for (const UnitPlan& move : plan_.moves)
+    end_s[move.unit.value] = EndOf(move, request_.drives[move.unit.value]);
+  const LargestPairBound largest = FindPairBound(service_, end_s, plan_.bound_s);
+  plan_.pair_bound_s = largest.bound_s;
+  plan_.pair_bound_by = largest.by;
 }
 
 Plan Planner::Finish() {
@@ -362,7 +389,7 @@ Plan Planner::Finish() {
                 &plan_);
   plan_.tightest = FindTightest(scene_, local_search_.tracks, plain, kTightest);
   plan_.too_near = too_near_;
-  plan_.bound_s = TimeBoundS(service_);
+  FindBounds();
   plan_.unserved = service_.NotServed();
   return std::move(plan_);
 }
@@ -383,8 +410,7 @@ Result<Plan> Planner::Run() {
   if (options_.leave_stuck) service_.DropTargetsThatMeet();
   if (!request_.given.empty()) return AmongGiven();
   if (options_.power.any()) FOCALFLEET_TRY(CheckPower(service_, options_));
-  const bool dense = MeanNeighbours() > kDenseNeighbours;
-  const bool at_once = !dense && !options_.stall_tolerant;
+  const bool at_once = !options_.stall_tolerant;
   // An order sends every unit through its cell, which costs a fleet that a camera corrects most of
   // its accuracy. A few units that stand too near must not lead to it.
   const Scene as_ruled = scene_;
@@ -417,7 +443,7 @@ Result<Plan> Planner::Run() {
                    Tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s});
   FOCALFLEET_TRY_ASSIGN(
       plan_, Schedule(pieces, scene_, request_.drives, options_, ledger ? &*ledger : nullptr));
-  if (at_once && too_near_.empty() && !stuck_for_order_.empty()) ServeTheRest();
+  if (at_once && too_near_.empty() && (dense_ || !stuck_for_order_.empty())) ServeTheRest();
   if (local_search_.tracks.empty()) TracksOfPlan();
   return Finish();
 }

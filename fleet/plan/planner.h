@@ -67,6 +67,9 @@ struct PlanOptions {
   /// With another objective than kSoonest the plan ends by then (0: when the soonest one does).
   /// With kSoonest: the time that may be used at no cost, where the bound is shorter.
   double within_s = 0;
+  /// CPU time for an earlier end than the first plan has, where that is far from the bound. The
+  /// work is counted, so that the plan is the same on every machine.
+  double improve_cpu_s = 1;
   std::uint64_t seed = 1;
   Abandoned abandoned = {};  // once true, MakePlan ends soon
   PowerLimits power = {};    // hard at every instant, for every skew and clock

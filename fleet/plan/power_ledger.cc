@@ -85,6 +85,20 @@ bool PowerLedger::Fits(std::uint32_t unit, const AxisPaths& path, const AxisPath
   return fits;
 }
 
+bool PowerLedger::HasRoom(std::uint32_t unit, double power_W, double from_s, double to_s) const {
+  const double error = tolerance_.clock_error;
+  const double first_s = std::max(0.0, from_s / (1 + error) - tolerance_.start_skew_s);
+  const double last_s = to_s / (1 - error) + tolerance_.start_skew_s;
+  const auto last = static_cast<std::size_t>(last_s / kSlotS);
+  const auto over = [&](const std::vector<std::int64_t>& sums, double most_W) {
+    if (most_W <= 0) return false;
+    for (auto n = static_cast<std::size_t>(first_s / kSlotS); n <= last; ++n)
+      if ((n < sums.size() ? sums[n] : 0) + Nanowatts(power_W) > Nanowatts(most_W)) return true;
+    return false;
+  };
+  return !over(rails_[rail_[unit]], limits_.rail_W) && !over(total_, limits_.total_W);
+}
+
 double PowerLedger::BeginAfter(double end_s) const {
   const double last_s = end_s / (1 - tolerance_.clock_error) + tolerance_.start_skew_s;
   return (last_s + kSlotS + tolerance_.start_skew_s) * (1 + tolerance_.clock_error);

@@ -1,0 +1,505 @@
+#include "fleet/plan/dense_search.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "fleet/plan/joint_search.h"
+#include "fleet/plan/motions.h"
+#include "fleet/plan/occupancy.h"
+#include "fleet/plan/soft_search.h"
+#include "protocol/base/rng.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr double kStepDeg = 6;  // that the quickest unit turns in one step
+/// Units that are planned anew together, at most.
+constexpr std::size_t kChosenMost = 8;
+constexpr std::int32_t kBold = 3;
+/// Repairs of the first plan until more time is allowed: one for so many units, and at least so
+/// many.
+constexpr int kUnitsPerRepair = 2;
+constexpr int kRepairsAtLeast = 100;
+constexpr std::int32_t kExtendBy = 6;  // the time grows by this part of it
+constexpr int kTriesWithMostTime = 3;
+/// More conflicts than one for so many units, which hardly get fewer: no end is in sight.
+constexpr std::size_t kHopelessShare = 10;
+constexpr double kWithinMost = 2;  // times the time of the first plan; it may never take longer
+constexpr int kRepairsPerCut = 120;
+/// A cut is at least this share of the time that is above the bound; each failure halves it.
+constexpr double kCutShare = 0.4;
+constexpr int kFailuresMost = 16;      // in a row, of the smallest cut
+constexpr double kGoodEnough = 1.005;  // times the bound: nothing is left to gain
+/// Repairs of one pair without success, after which it need not be clear with notice.
+constexpr int kRepairsWithNotice = 12;
+/// A pair that fails so often weighs one conflict more (breakout local search, Morris 1993).
+constexpr int kFailuresPerWeight = 6;
+/// What work costs, in seconds of CPU.
+constexpr double kExpansionCost_s = 0.6e-6;
+constexpr double kReplanCost_s = 150e-6;
+constexpr double kJointStepCost_s = 0.8e-6;
+
+class DenseSearch {
+ public:
+  DenseSearch(const LocalSearchRequest& request, const DenseSearchOptions& options)
+      : q_(request),
+        options_(options),
+        scene_(*request.scene),
+        rng_(Rng::Stream(request.seed, "dense")),
+        motions_(request),
+        occupancy_(motions_, StepsOf(request)),
+        end_step_(std::min(occupancy_.steps().count - 1,
+                           static_cast<std::int32_t>(std::ceil(options.within * request.within_s /
+                                                               occupancy_.steps().step_s())) +
+                               1)) {}
+
+  LocalSearchResult Run();
+
+ private:
+  using Pair = std::pair<std::uint32_t, std::uint32_t>;
+  struct Before {
+    std::uint32_t unit = 0;
+    AxisPaths path;
+  };
+
+  static TimeSteps StepsOf(const LocalSearchRequest& q);
+  void Begin();
+  bool MayPlan(std::uint32_t unit) const {
+    return q_.movable[unit] != 0 && !motions_.IsGiven(unit) && scene_.is_place(unit);
+  }
+  bool Replan(std::uint32_t unit);
+  bool ReplanTogether(std::span<const std::uint32_t> units);
+  void FindRests(std::span<const std::uint32_t> units);
+  void Set(std::uint32_t unit, const AxisPaths& path) {
+    motions_.Replace(unit, path);
+    occupancy_.Forget(unit);
+  }
+  void TakeOut(std::uint32_t unit) {
+    motions_.TakeOut(unit);
+    occupancy_.Forget(unit);
+  }
+  bool Choose(std::uint32_t unit);
+  [[nodiscard]] bool IsChosen(std::uint32_t unit) const;
+  [[nodiscard]] bool AreNeighbours(std::uint32_t a, std::uint32_t b) const {
+    return motions_.SlotOf(a, b) < scene_.neighbours(a).size();
+  }
+  void ChooseMet(std::size_t first, std::size_t last);
+  void PutBack(std::span<const Before> before);
+  void UpdateConflicts(std::uint32_t unit);
+  [[nodiscard]] int WeightOf(const Pair& pair) const {
+    const auto it = failures_.find(pair);
+    return 1 + (it == failures_.end() ? 0 : it->second / kFailuresPerWeight);
+  }
+  [[nodiscard]] int ConflictsOfChosen() const;
+  bool Repair(const Pair& pair);
+  bool PlanChosen(std::size_t planned, bool ok);
+  bool RepairAll(int repairs_most);
+  void Improve();
+  bool CompleteFirst();
+  bool CutTo(std::int32_t end_step);
+  [[nodiscard]] double EndOfUnit(std::uint32_t unit) const {
+    return MayPlan(unit) && !IsEmpty(motions_.path(unit)) ? motions_.track(unit).end_s() : 0;
+  }
+  [[nodiscard]] double End() const;
+  [[nodiscard]] double Work_s() const {
+    return static_cast<double>(search_.expansions()) * kExpansionCost_s +
+           static_cast<double>(replans_) * kReplanCost_s +
+           static_cast<double>(joint_.work()) * kJointStepCost_s;
+  }
+
+  const LocalSearchRequest& q_;
+  const DenseSearchOptions& options_;
+  const Scene& scene_;
+  Rng rng_;
+  Motions motions_;
+  Occupancy occupancy_;
+  SoftSearch search_;
+  JointSearch joint_;
+  std::int32_t end_step_ = 0;
+  std::set<Pair> conflicts_;
+  std::map<Pair, int> failures_;    // repairs of a pair that did not stay
+  std::vector<Before> chosen_;      // taken out, or planned anew already
+  std::vector<Before> before_cut_;  // of units that were planned anew since the time was cut
+  bool in_cut_ = false;
+  std::uint64_t replans_ = 0;
+  std::array<Surround, JointSearch::kMembersMax> around_;  // scratch
+  std::vector<MovingNeighbour> moving_;                    // scratch
+  std::vector<std::uint8_t> rests_;                        // scratch
+};
+
+TimeSteps DenseSearch::StepsOf(const LocalSearchRequest& q) {
+  constexpr std::int64_t kRoundTicks = 60;  // usual drives turn whole vectors in such a step
+  double step_s = 1e9;
+  for (std::uint32_t i = 0; i < q.scene->size(); ++i) {
+    double own_s = 0;
+    for (const Axis axis : kAxes)
+      own_s = std::max(own_s, kStepDeg * std::numbers::pi / 180 / q.scene->arm(i).step_rad(axis) *
+                                  SecondsPerVector(q.drives[i].axis[Index(axis)]));
+    step_s = std::min(step_s, own_s);
+  }
+  double end_s = kWithinMost * q.within_s;
+  for (std::uint32_t i = 0; i < q.scene->size() && !q.begin_with.empty(); ++i)
+    if (!IsEmpty(q.begin_with[i]) && q.scene->is_place(i))
+      end_s =
+          std::max(end_s, Track(q.scene->arm(i), q.drives[i], q.from[i], q.begin_with[i]).end_s());
+  TimeSteps steps;
+  steps.ticks =
+      std::max<std::int64_t>(1, std::llround(step_s / kTickS / kRoundTicks)) * kRoundTicks;
+  // A way may need a step more than its time: parts of vectors are left at the end of a step.
+  steps.count = static_cast<std::int32_t>(std::ceil(end_s / steps.step_s())) + 2;
+  return steps;
+}
+
+double DenseSearch::End() const {
+  double end_s = 0;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) end_s = std::max(end_s, EndOfUnit(i));
+  return end_s;
+}
+
+void DenseSearch::UpdateConflicts(std::uint32_t unit) {
+  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot) {
+    const Pair pair = std::minmax(unit, scene_.neighbours(unit)[slot].unit);
+    if (motions_.Meets(unit, motions_.track(unit), slot))
+      conflicts_.insert(pair);
+    else
+      conflicts_.erase(pair);
+  }
+}
+
+/// The steps in which power has no room for all these units.
+void DenseSearch::FindRests(std::span<const std::uint32_t> units) {
+  rests_.clear();
+  if (q_.ledger == nullptr) return;
+  double power_W = 0;
+  for (const std::uint32_t i : units)
+    for (std::size_t k = 0; k < kAxisCount; ++k) power_W += q_.ledger->Motor_W(i, k);
+  const double h = occupancy_.steps().step_s();
+  rests_.resize(static_cast<std::size_t>(end_step_) + 1);
+  for (std::size_t step = 0; step < rests_.size(); ++step) {
+    const double from_s = static_cast<double>(step) * h;
+    const bool room = std::all_of(units.begin(), units.end(), [&](std::uint32_t i) {
+      return q_.ledger->HasRoom(i, power_W, from_s, from_s + h);
+    });
+    rests_[step] = room ? 0 : 1;
+  }
+}
+
+/// Pre: the unit is taken out.
+bool DenseSearch::Replan(std::uint32_t unit) {
+  ++replans_;
+  occupancy_.Look(unit, &around_[0]);
+  moving_.clear();
+  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot) {
+    const NeighbourNeed& near = scene_.neighbours(unit)[slot];
+    if (scene_.is_place(near.unit) && !motions_.track(near.unit).legs().empty())
+      moving_.push_back({&scene_.arm(near.unit), &motions_.track(near.unit), near.need_mm,
+                         motions_.ToleranceOf(unit, slot)});
+  }
+  FindRests({&unit, 1});
+  SoftSearch::Question question{.arm = &scene_.arm(unit),
+                                .drive = &q_.drives[unit],
+                                .around = &around_[0],
+                                .moving = moving_,
+                                .steps = occupancy_.steps(),
+                                .from = q_.from[unit],
+                                .to = q_.to[unit],
+                                .within = RangeAround(scene_.arm(unit), q_.from[unit]),
+                                .end_step = end_step_,
+                                .rests = rests_};
+  auto found = search_.Find(question);
+  if (!found) {
+    // Where all ways meet others, the search among them has no end: a bold one has.
+    question.meets_cost = kBold;
+    found = search_.Find(question);
+  }
+  if (!found || !motions_.KeepsLimits(unit, found->paths)) return false;
+  Set(unit, found->paths);
+  return motions_.Cost(unit, motions_.track(unit), Motions::kNever) != Motions::kNever;
+}
+
+/// Pre: the units are taken out; all are neighbours of each other.
+bool DenseSearch::ReplanTogether(std::span<const std::uint32_t> units) {
+  JointSearch::Question question;
+  question.steps = occupancy_.steps();
+  question.end_step = end_step_;
+  std::array<JointSearch::Member, JointSearch::kMembersMax> members;
+  for (std::size_t m = 0; m < units.size(); ++m) {
+    const std::uint32_t i = units[m];
+    occupancy_.Look(i, &around_[m]);
+    members[m] = {.arm = &scene_.arm(i),
+                  .drive = &q_.drives[i],
+                  .around = &around_[m],
+                  .standing = scene_.standing(i),
+                  .from = q_.from[i],
+                  .to = q_.to[i],
+                  .within = RangeAround(scene_.arm(i), q_.from[i])};
+    for (std::size_t other = 0; other < m; ++other)
+      question.need_mm[other][m] =
+          scene_.neighbours(units[other])[motions_.SlotOf(units[other], i)].need_mm;
+  }
+  question.members = std::span(members).first(units.size());
+  FindRests(units);
+  question.rests = rests_;
+  const auto found = joint_.Find(question, &rng_);
+  if (!found) return false;
+  for (std::size_t m = 0; m < units.size(); ++m) {
+    if (!motions_.KeepsLimits(units[m], found->paths[m])) return false;
+    Set(units[m], found->paths[m]);
+    if (motions_.Cost(units[m], motions_.track(units[m]), Motions::kNever) == Motions::kNever)
+      return false;
+  }
+  // The members keep to one clock: they are clear of each other, but perhaps not with notice.
+  for (std::size_t m = 0; m < units.size(); ++m)
+    for (std::size_t other = 0; other < m; ++other)
+      if (const std::uint32_t slot = motions_.SlotOf(units[m], units[other]);
+          motions_.Meets(units[m], motions_.track(units[m]), slot))
+        motions_.GiveUpNotice(units[m], slot);
+  return true;
+}
+
+/// The longest way first: it has the least room to give way.
+void DenseSearch::Begin() {
+  std::vector<std::pair<double, std::uint32_t>> order;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    if (!scene_.is_place(i)) continue;
+    const bool begun = !q_.begin_with.empty() && Reaches(q_, i, q_.begin_with[i]);
+    if (motions_.IsGiven(i))
+      motions_.Begin(i, q_.begin_with[i]);
+    else if (q_.movable[i] == 0)
+      motions_.BeginStanding(i);
+    else if (begun && motions_.KeepsLimits(i, q_.begin_with[i]))
+      Set(i, q_.begin_with[i]);
+    else
+      order.emplace_back(-Straight(q_.drives[i], q_.from[i], q_.to[i]).end_s, i);
+  }
+  std::sort(order.begin(), order.end());
+  for (const auto& [end, i] : order) {
+    if (IsAbandoned(q_.abandoned) || Replan(i)) continue;
+    // It meets others, but has a way.
+    const AxisPaths straight = Straight(q_.drives[i], q_.from[i], q_.to[i]).path;
+    if (motions_.KeepsLimits(i, straight)) Set(i, straight);
+  }
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    if (!MayPlan(i)) continue;
+    UpdateConflicts(i);
+    end_step_ = std::max(
+        end_step_,
+        static_cast<std::int32_t>(std::ceil(EndOfUnit(i) / occupancy_.steps().step_s() - 1e-6)));
+  }
+  if (q_.begin_with.empty()) return;
+  // An order has no notice to keep.
+  const std::set<Pair> met = conflicts_;
+  for (const auto& [a, b] : met) {
+    motions_.GiveUpNotice(a, motions_.SlotOf(a, b));
+    UpdateConflicts(a);
+  }
+}
+
+bool DenseSearch::Choose(std::uint32_t unit) {
+  if (!MayPlan(unit) || IsChosen(unit)) return false;
+  chosen_.push_back({unit, motions_.path(unit)});
+  const bool known = std::any_of(before_cut_.begin(), before_cut_.end(),
+                                 [&](const Before& b) { return b.unit == unit; });
+  if (in_cut_ && !known) before_cut_.push_back(chosen_.back());
+  TakeOut(unit);
+  return true;
+}
+
+bool DenseSearch::IsChosen(std::uint32_t unit) const {
+  return std::any_of(chosen_.begin(), chosen_.end(),
+                     [&](const Before& b) { return b.unit == unit; });
+}
+
+/// Chooses the units that these chosen ones meet.
+void DenseSearch::ChooseMet(std::size_t first, std::size_t last) {
+  for (std::size_t n = first; n < last; ++n) {
+    const std::uint32_t i = chosen_[n].unit;
+    for (std::uint32_t slot = 0; slot < scene_.neighbours(i).size(); ++slot) {
+      if (chosen_.size() >= kChosenMost) return;
+      if (motions_.Meets(i, motions_.track(i), slot)) Choose(scene_.neighbours(i)[slot].unit);
+    }
+  }
+}
+
+void DenseSearch::PutBack(std::span<const Before> before) {
+  // The limits of power may hold only once all are out.
+  for (const Before& b : before) TakeOut(b.unit);
+  for (const Before& b : before) Set(b.unit, b.path);
+}
+
+/// The sum of the weights of the conflicts that chosen units have now.
+int DenseSearch::ConflictsOfChosen() const {
+  int weight = 0;
+  for (const Before& b : chosen_) {
+    for (std::uint32_t slot = 0; slot < scene_.neighbours(b.unit).size(); ++slot) {
+      const std::uint32_t other = scene_.neighbours(b.unit)[slot].unit;
+      if (IsChosen(other) && other < b.unit) continue;
+      if (motions_.Meets(b.unit, motions_.track(b.unit), slot))
+        weight += WeightOf(std::minmax(b.unit, other));
+    }
+  }
+  return weight;
+}
+
+/// Plans the chosen units from `planned` on, and those that they meet. False: one has no way.
+bool DenseSearch::PlanChosen(std::size_t planned, bool ok) {
+  std::size_t looked = 0;
+  while (ok) {
+    ChooseMet(looked, planned);
+    looked = planned;
+    if (planned == chosen_.size()) break;
+    std::swap(chosen_[planned], chosen_[planned + rng_.Below(chosen_.size() - planned)]);
+    ok = Replan(chosen_[planned++].unit);
+  }
+  return ok;
+}
+
+/// Plans two units in conflict anew, and those that they meet then. True: the conflicts weigh no
+/// more than before, and the change stays.
+bool DenseSearch::Repair(const Pair& pair) {
+  chosen_.clear();
+  Choose(pair.first);
+  Choose(pair.second);
+  if (chosen_.empty()) return false;
+  bool ok = true;
+  std::size_t planned = chosen_.size();
+  if (planned == 2 && rng_.Below(3) != 0) {
+    // Sometimes a third unit stands between the two.
+    const auto near = scene_.neighbours(pair.first);
+    const std::uint32_t third = near[rng_.Below(near.size())].unit;
+    if (rng_.Below(4) == 0 && AreNeighbours(third, pair.second)) planned += Choose(third) ? 1 : 0;
+    std::array<std::uint32_t, JointSearch::kMembersMax> units{};
+    for (std::size_t n = 0; n < planned; ++n) units[n] = chosen_[n].unit;
+    ok = ReplanTogether(std::span(units).first(planned));
+  } else {
+    if (planned == 2 && rng_.Below(2) == 0) std::swap(chosen_[0], chosen_[1]);
+    ok = Replan(chosen_[0].unit);
+    planned = 1;
+    const std::size_t extra = rng_.Below(3);
+    for (std::size_t n = 0; n < extra; ++n) {
+      const auto near = scene_.neighbours(chosen_[rng_.Below(chosen_.size())].unit);
+      Choose(near[rng_.Below(near.size())].unit);
+    }
+  }
+  ok = PlanChosen(planned, ok);
+  if (ok) {
+    int before = 0;
+    for (const Pair& p : conflicts_)
+      if (IsChosen(p.first) || IsChosen(p.second)) before += WeightOf(p);
+    ok = ConflictsOfChosen() <= before;
+  }
+  if (!ok) {
+    ++failures_[pair];
+    PutBack(chosen_);
+    return false;
+  }
+  for (const Before& b : chosen_) UpdateConflicts(b.unit);
+  return true;
+}
+
+/// True: no conflict is left.
+bool DenseSearch::RepairAll(int repairs_most) {
+  for (int n = 0; n < repairs_most && !conflicts_.empty() && !IsAbandoned(q_.abandoned); ++n) {
+    auto it = conflicts_.begin();
+    std::advance(it, static_cast<std::ptrdiff_t>(rng_.Below(conflicts_.size())));
+    const Pair pair = *it;
+    Repair(pair);
+    if (n % kRepairsWithNotice == kRepairsWithNotice - 1 && conflicts_.contains(pair)) {
+      motions_.GiveUpNotice(pair.first, motions_.SlotOf(pair.first, pair.second));
+      UpdateConflicts(pair.first);
+    }
+  }
+  return conflicts_.empty();
+}
+
+/// Where repairs take long more time is allowed, up to the end of the steps.
+bool DenseSearch::CompleteFirst() {
+  const int repairs = std::max(kRepairsAtLeast, static_cast<int>(scene_.size()) / kUnitsPerRepair);
+  const std::int32_t most = occupancy_.steps().count - 1;
+  for (int tries = 0; tries < kTriesWithMostTime; tries += end_step_ == most ? 1 : 0) {
+    const std::size_t before = conflicts_.size();
+    if (RepairAll(repairs)) return true;
+    if (IsAbandoned(q_.abandoned)) return false;
+    // Units without any way keep many others in conflict.
+    if (conflicts_.size() > scene_.size() / kHopelessShare && 10 * conflicts_.size() > 9 * before)
+      return false;
+    end_step_ = std::min(most, end_step_ + std::max(1, end_step_ / kExtendBy));
+  }
+  return conflicts_.empty();
+}
+
+/// All units end before this step. False: no such plan was found, and all move as before.
+bool DenseSearch::CutTo(std::int32_t end_step) {
+  const std::int32_t end_before = end_step_;
+  end_step_ = end_step;
+  in_cut_ = true;
+  before_cut_.clear();
+  const double end_s = (end_step + 1e-6) * occupancy_.steps().step_s();
+  bool ok = true;
+  for (std::uint32_t i = 0; i < scene_.size() && ok; ++i) {
+    if (EndOfUnit(i) <= end_s) continue;
+    chosen_.clear();
+    Choose(i);
+    ok = PlanChosen(1, Replan(i));
+    if (!ok) break;
+    for (const Before& b : chosen_) UpdateConflicts(b.unit);
+  }
+  ok = ok && RepairAll(kRepairsPerCut);
+  in_cut_ = false;
+  if (ok) return true;
+  end_step_ = end_before;
+  PutBack(before_cut_);
+  conflicts_.clear();
+  return false;
+}
+
+void DenseSearch::Improve() {
+  const double h = occupancy_.steps().step_s();
+  const double begun_s = Work_s();
+  int failures = 0;
+  double share = kCutShare;
+  const auto least_step = static_cast<std::int32_t>(std::ceil(q_.within_s / h)) + 1;
+  while (Work_s() - begun_s < options_.improve_cpu_s && !IsAbandoned(q_.abandoned)) {
+    const double end_s = End();
+    if (end_s <= kGoodEnough * q_.within_s) break;
+    const auto now = static_cast<std::int32_t>(std::ceil(end_s / h - 1e-6));
+    const auto cut =
+        std::max<std::int32_t>(1, static_cast<std::int32_t>(share * (end_s - q_.within_s) / h));
+    const std::int32_t to = std::max(now - cut, least_step);
+    if (to >= now) break;
+    if (CutTo(to)) {
+      failures = 0;
+      share = std::min(2 * share, kCutShare);
+    } else {
+      share /= 2;
+      if (cut == 1 && ++failures >= kFailuresMost) break;
+    }
+  }
+}
+
+LocalSearchResult DenseSearch::Run() {
+  LocalSearchResult result;
+  Begin();
+  const bool complete = CompleteFirst();
+  if (complete) Improve();
+  for (std::uint32_t i = 0; i < scene_.size(); ++i)
+    if (scene_.is_place(i) && (motions_.track(i).legs().empty() || motions_.InConflict(i)))
+      result.in_conflict.push_back(i);
+  motions_.MoveInto(&result);
+  return result;
+}
+
+}  // namespace
+
+LocalSearchResult SearchDense(const LocalSearchRequest& request,
+                              const DenseSearchOptions& options) {
+  return DenseSearch(request, options).Run();
+}
+
+}  // namespace focalfleet
