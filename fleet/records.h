@@ -250,8 +250,8 @@ struct AuditRow {
     std::string program = {};
     bool operator==(const Process&) const = default;
   };
-  std::string door;     // socket, http
-  std::string name;     // uid 1000, token NAME
+  std::string door;  // socket, http
+  std::string name;  // uid 1000, token NAME
   std::string role;
   std::optional<Process> process = {};
   std::string address = {};  // of HTTP

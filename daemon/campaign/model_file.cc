@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
-#include "sim/campaigns/diagnosis/planted.h"
 #include "sim/campaigns/diagnosis/geometry_check.h"
+#include "sim/campaigns/diagnosis/planted.h"
 #include "sim/campaigns/effects/empirical.h"
 #include "sim/campaigns/effects/registry.h"
 

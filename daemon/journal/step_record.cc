@@ -10,7 +10,8 @@
 namespace focalfleet::journal {
 namespace {
 
-/// A plan as it is recorded: the planner makes it again of its job, or the reason why there is none.
+/// A plan as it is recorded: the planner makes it again of its job, or the reason why there is
+/// none.
 struct RecordedPlan {
   std::uint64_t job = 0;
   std::optional<Error> error;  // of a plan; an answer to a late move is made again
@@ -150,8 +151,9 @@ Status Replayer::Step(std::string_view record) {
                                                 {"times and changes", now.rest != recorded.rest}};
   for (const auto& [what, differs] : parts)
     if (differs)
-      return Fail(ErrorCode::kRefused, fmt::format("step {} at {:.6f} s decides other {}", steps_,
-                                                   1e-9 * static_cast<double>(inputs.now.ns), what));
+      return Fail(ErrorCode::kRefused,
+                  fmt::format("step {} at {:.6f} s decides other {}", steps_,
+                              1e-9 * static_cast<double>(inputs.now.ns), what));
   return {};
 }
 

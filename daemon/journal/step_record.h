@@ -1,6 +1,6 @@
 // A record of one step of the coordinator: all that it took in, and a digest of what it decided. A
-// coordinator that starts from the same state and takes the recorded inputs must decide the same, to
-// the bit. Plans are not recorded: the planner makes the same one of the same job.
+// coordinator that starts from the same state and takes the recorded inputs must decide the same,
+// to the bit. Plans are not recorded: the planner makes the same one of the same job.
 #pragma once
 
 #include <cstdint>

@@ -64,7 +64,8 @@ Status EventLoop::Open() {
     return Fail(ErrorCode::kUnavailable,
                 std::string("no descriptors left: ") + std::strerror(errno));
   for (std::size_t line = 0; line < parts_.shell.lines->size(); ++line)
-    if (parts_.shell.lines->fd(line) >= 0) FOCALFLEET_TRY(Watch(parts_.shell.lines->fd(line), line));
+    if (parts_.shell.lines->fd(line) >= 0)
+      FOCALFLEET_TRY(Watch(parts_.shell.lines->fd(line), line));
   FOCALFLEET_TRY(Watch(parts_.shell.handler->fd(), kRequests));
   FOCALFLEET_TRY(Watch(parts_.threads->fd(), kThreads));
   FOCALFLEET_TRY(Watch(timer_, kTimer));

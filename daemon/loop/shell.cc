@@ -99,8 +99,7 @@ void Shell::Step() {
   // This order matters: a batch that is committed in between is reported one step later.
   // The store's thread may change its failure at any time, so it is read once.
   const std::optional<Error> failure = parts_.store->failure();
-  if (store_.failing != failure.has_value())
-    parts_.alarms->NoteStore(parts_.clock.Wall(), failure);
+  if (store_.failing != failure.has_value()) parts_.alarms->NoteStore(parts_.clock.Wall(), failure);
   store_.failing = failure.has_value();
   store_.committed_through = parts_.store->committed_through();
   const std::vector<RefusedRow> refused = parts_.store->TakeRefused();

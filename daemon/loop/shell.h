@@ -79,8 +79,8 @@ class Shell {
     std::function<void()> look = [] {};
     std::function<void(TurnPoint)> passed = [](TurnPoint) {};
     /// Receives each step, before anything of it is done.
-    std::function<void(const Inputs&, const Effects&)> stepped = [](const Inputs&,
-                                                                    const Effects&) {};
+    std::function<void(const Inputs&, const Effects&)> stepped = [](const Inputs&, const Effects&) {
+    };
   };
 
   explicit Shell(Parts parts);

@@ -1,4 +1,5 @@
-// The thread that may wait for a disk, so that no other has to: it takes the turns of a StoreWriter.
+// The thread that may wait for a disk, so that no other has to: it takes the turns of a
+// StoreWriter.
 #pragma once
 
 #include <atomic>

@@ -1,9 +1,10 @@
 // The writer of the store. Batches of rows are committed in order, and none is dropped. A batch
 // that cannot be written now is tried again each second, and all later ones wait. A row that can
 // never be written (fleet/row_check.h, or a contradiction to what is stored) would hold up all
-// others for ever. This row alone is set aside and reported. Status is published after the commit of
-// the rows that it reflects, never before. The writer returns three facts: the batch through which
-// all is durable, the rows up to there that were set aside, and whether the last attempt failed.
+// others for ever. This row alone is set aside and reported. Status is published after the commit
+// of the rows that it reflects, never before. The writer returns three facts: the batch through
+// which all is durable, the rows up to there that were set aside, and whether the last attempt
+// failed.
 //
 // Waiting batches become one transaction, in order. Thereby the writer falls behind a slow disk by
 // no more than one flush.

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "daemon/study/study.h"
 #include "daemon/files/text_file.h"
 #include "daemon/process/command_line.h"
 #include "daemon/process/config_manual.h"
 #include "daemon/simulator/command_line.h"
+#include "daemon/study/study.h"
 
 namespace {
 

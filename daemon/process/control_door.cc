@@ -13,9 +13,7 @@
 namespace focalfleet {
 namespace {
 
-DurationNs SinceStart() {
-  return {std::chrono::steady_clock::now().time_since_epoch().count()};
-}
+DurationNs SinceStart() { return {std::chrono::steady_clock::now().time_since_epoch().count()}; }
 
 }  // namespace
 

@@ -167,7 +167,8 @@ Result<Summary> MergeFolder(const std::string& folder) {
       if (json.is_discarded() && in.peek() == std::ifstream::traits_type::eof()) continue;
       const Status taken = summary.Take(json);
       if (!taken)
-        return Fail(ErrorCode::kInvalid, fmt::format("{}:{}: {}", path, number, taken.error().text));
+        return Fail(ErrorCode::kInvalid,
+                    fmt::format("{}:{}: {}", path, number, taken.error().text));
     }
   }
   return summary;

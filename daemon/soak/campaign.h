@@ -1,6 +1,6 @@
-// A campaign of nights: seeds one after the other, what each showed, and the table over all of them.
-// Tasks on several machines each write one line of JSON a seed; the lines of all of them make the
-// table that one run would have made.
+// A campaign of nights: seeds one after the other, what each showed, and the table over all of
+// them. Tasks on several machines each write one line of JSON a seed; the lines of all of them make
+// the table that one run would have made.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// The draws of a seed: layout, load, and which fault sites are armed with which rates. They are made
-// before the run begins, so that they can be printed first.
+// The draws of a seed: layout, load, and which fault sites are armed with which rates. They are
+// made before the run begins, so that they can be printed first.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ struct DrawLimits {
 
 Draws DrawSeed(std::uint64_t seed, const DrawLimits& limits);
 
-/// One line for people.
+/// A line for people.
 std::string Describe(const Draws& draws);
 
 }  // namespace focalfleet::soak

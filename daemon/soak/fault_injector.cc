@@ -29,8 +29,8 @@ FaultInjector::FaultInjector(const Parts& parts, HostInstant now)
     : parts_(parts), now_(now), rng_(Rng::Stream(parts.draws->seed, "soak faults")) {
   for (std::size_t n = 0; n < kFaultSites; ++n) {
     const auto site = static_cast<FaultSite>(n);
-    const bool timed = parts_.draws->armed[n] && !IsByOccasion(site) && !IsOfOperators(site) &&
-                       !IsOfCamera(site);
+    const bool timed =
+        parts_.draws->armed[n] && !IsByOccasion(site) && !IsOfOperators(site) && !IsOfCamera(site);
     due_[n] = timed ? now + Gap(site) : kNever;
   }
 }
@@ -149,7 +149,8 @@ void FaultInjector::Hear(bool garbage) {
   }
   const auto& units = parts_.plant->layout().units();
   const Unit& unit = units[rng_.Below(units.size())];
-  frame = Encode(HostMessage(StatusRequest{}), {unit.node, static_cast<std::uint8_t>(rng_.Below(256))});
+  frame =
+      Encode(HostMessage(StatusRequest{}), {unit.node, static_cast<std::uint8_t>(rng_.Below(256))});
   parts_.plant->world().Inject(unit.bus, frame, now_, 1);
 }
 
@@ -208,7 +209,8 @@ bool FaultInjector::BeginOnBus(FaultSite site) {
       break;
     case kForeignStop:
       parts_.plant->world().Inject(
-          bus, Encode(HostMessage(Stop{}), {kBroadcastNode, static_cast<std::uint8_t>(rng_.Below(256))}),
+          bus,
+          Encode(HostMessage(Stop{}), {kBroadcastNode, static_cast<std::uint8_t>(rng_.Below(256))}),
           now_, 1);
       break;
     default:
@@ -267,8 +269,8 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
     case kUnitMarkLost:
       // FLASH shows its damage when the unit starts anew.
       power_cut(row);
-      disturb.SpoilFlash(unit, site == kUnitFlashLost ? sim::FlashDamage::kOldCounts
-                                                      : sim::FlashDamage::kNoMark);
+      disturb.SpoilFlash(
+          unit, site == kUnitFlashLost ? sim::FlashDamage::kOldCounts : sim::FlashDamage::kNoMark);
       return true;
     case kUnitIntermittent:
       for (int part = 0; part < 8; ++part) {

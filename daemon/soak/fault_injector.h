@@ -1,5 +1,5 @@
-// The injector lets faults of the armed sites happen: those that go by time by itself, those that go
-// by occasions when it is asked. It counts each site that was reached, and notes what a fault
+// The injector lets faults of the armed sites happen: those that go by time by itself, those that
+// go by occasions when it is asked. It counts each site that was reached, and notes what a fault
 // touches and until when.
 #pragma once
 

@@ -41,13 +41,12 @@ double BetweenSegments(Point a, Point b, Point c, Point d) {
   const double side_c = Cross(b - a, c - a), side_d = Cross(b - a, d - a);
   const double side_a = Cross(d - c, a - c), side_b = Cross(d - c, b - c);
   if (side_c * side_d < 0 && side_a * side_b < 0) return 0;
-  return std::min({FromSegment(a, c, d), FromSegment(b, c, d), FromSegment(c, a, b),
-                   FromSegment(d, a, b)});
+  return std::min(
+      {FromSegment(a, c, d), FromSegment(b, c, d), FromSegment(c, a, b), FromSegment(d, a, b)});
 }
 
 bool Moves(const sim::UnitTruth& truth) {
-  return truth.powered &&
-         (truth.state == UnitState::kMoving || truth.state == UnitState::kHoming);
+  return truth.powered && (truth.state == UnitState::kMoving || truth.state == UnitState::kHoming);
 }
 
 }  // namespace
@@ -119,7 +118,7 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
   in_flight_.reset();
   for (const Row& row : rows)
     if (const auto* vector = std::get_if<VectorRow>(&row)) {
-      auto& places = told_[vector->serial.value];
+      auto& places = reported_[vector->serial.value];
       places.push_back(shadow_.places[vector->serial.value]);
       if (places.size() > kToldMax) places.pop_front();
     }
@@ -172,8 +171,8 @@ void Judge::LifeBegins() {
   }
   shadow_ = std::move(*read);
   in_flight_.reset();
-  told_.clear();
-  for (const auto& [serial, place] : shadow_.places) told_[serial].push_back(place);
+  reported_.clear();
+  for (const auto& [serial, place] : shadow_.places) reported_[serial].push_back(place);
 }
 
 const StoredPicture* Judge::Durable() {
@@ -202,19 +201,18 @@ void Judge::Published(const StatusBatch& status) {
     const UnitDrive& drive = plant_->drives()[row->value];
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       const int witness = static_cast<int>(value.witness[axis]);
-      if (witness < 3) continue;  // told as not exact
+      if (witness < 3) continue;  // reported as not exact
       const double step = DegreesPerVector(unit.axis[axis], drive.axis[axis]);
       const auto vectors = std::llround(value.low_deg[axis] / step);
-      const auto known = told_.find(value.serial.value);
+      const auto known = reported_.find(value.serial.value);
       const bool stored =
-          known != told_.end() &&
-          std::ranges::any_of(known->second, [&](const StoredPlace& place) {
+          known != reported_.end() && std::ranges::any_of(known->second, [&](const StoredPlace& place) {
             return place[axis].witness >= 3 && place[axis].low == vectors;
           });
       if (stored) continue;
-      const bool last = known != told_.end() && !known->second.empty();
+      const bool last = known != reported_.end() && !known->second.empty();
       const StoredAxis newest = last ? known->second.back()[axis] : StoredAxis{};
-      Broken("told", fmt::format("unit {} axis {} is told to be {} at {}, which was never "
+      Broken("reported", fmt::format("unit {} axis {} is reported to be {} at {}, which was never "
                                  "acknowledged; stored is witness {} at {}..{}",
                                  value.unit.value, axis, Name(value.witness[axis]), vectors,
                                  newest.witness, newest.low, newest.high));
@@ -252,8 +250,8 @@ void Judge::Look(HostInstant now) {
 void Judge::LookAtStarts(std::size_t row, const sim::UnitTruth& truth) {
   Seen& seen = seen_[row];
   if (truth.begun_twice > seen.begun_twice)
-    Broken("twice", fmt::format("unit {} began move {} twice", truth.id.value,
-                                truth.last_move.value));
+    Broken("twice",
+           fmt::format("unit {} began move {} twice", truth.id.value, truth.last_move.value));
   seen.begun_twice = truth.begun_twice;
   if (truth.moves_begun == seen.moves_begun) return;
   seen.moves_begun = truth.moves_begun;
@@ -274,8 +272,8 @@ std::optional<double> Judge::OffPlace(std::size_t row) const {
   if (place == shadow_.places.end() || !IsExact(place->second)) return std::nullopt;
   double off = 0;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    off = std::max(off, std::abs(truth.vectors[axis] -
-                                 static_cast<double>(place->second[axis].low)));
+    off =
+        std::max(off, std::abs(truth.vectors[axis] - static_cast<double>(place->second[axis].low)));
   return off;
 }
 
@@ -299,10 +297,10 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
     }
     const double off = std::max(low - truth.vectors[axis], truth.vectors[axis] - high);
     if (off <= slack) continue;
-    Broken("place", fmt::format("unit {} axis {} is at {:.1f}, stored is {}{:.0f}..{:.0f}",
-                                truth.id.value, axis, truth.vectors[axis],
-                                intent != shadow_.intents.end() ? "an open move within " : "",
-                                low, high));
+    Broken("place",
+           fmt::format("unit {} axis {} is at {:.1f}, stored is {}{:.0f}..{:.0f}", truth.id.value,
+                       axis, truth.vectors[axis],
+                       intent != shadow_.intents.end() ? "an open move within " : "", low, high));
   }
 }
 

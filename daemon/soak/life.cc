@@ -56,16 +56,16 @@ Status Life::Open() {
   for (std::size_t bus = 0; bus < layout.buses().size(); ++bus)
     ports.push_back(std::make_unique<PlantPort>(around_.plant, bus, around_.port));
   const auto buses = layout.buses();
-  lines_ = std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()),
-                                      std::move(ports));
+  lines_ =
+      std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()), std::move(ports));
   scheduler_ = std::make_unique<StatusScheduler>(
       layout.size(),
       StatusScheduler::Options{.rate_hz = 5, .version = "soak", .started = clock_.Wall()}, clock_);
   CoordinatorConfig config;
   config.has_camera = around_.camera != nullptr;
   around_.starts(stored, config);
-  coordinator_ = std::make_unique<Coordinator>(&layout, around_.plant->drives(), config,
-                                               std::move(stored));
+  coordinator_ =
+      std::make_unique<Coordinator>(&layout, around_.plant->drives(), config, std::move(stored));
   writer_ = std::make_unique<StoreWriter>(MakeSinks());
   MakeQueues();
   MakeShell();

@@ -25,7 +25,7 @@ struct Killed {
   FaultSite site{};
 };
 
-/// What happens around a life. All functions may be called at any time of it.
+/// Everything around a life. All functions may be called at any time of it.
 struct Surroundings {
   Plant* plant = nullptr;
   MemoryDisk* disk = nullptr;

@@ -247,10 +247,10 @@ struct MemoryDisk::Layer {
     return SQLITE_OK;
   }
 
-  static constexpr sqlite3_io_methods kMethods = {
-      2,          Close,    Read,    Write,      Truncate, Sync,    Size,
-      Lock,       Unlock,   Reserved, Control,   SectorSize, Device, ShmMap,
-      ShmLock,    ShmBarrier, ShmUnmap, nullptr, nullptr};
+  static constexpr sqlite3_io_methods kMethods = {2,          Close,      Read,    Write,  Truncate,
+                                                  Sync,       Size,       Lock,    Unlock, Reserved,
+                                                  Control,    SectorSize, Device,  ShmMap, ShmLock,
+                                                  ShmBarrier, ShmUnmap,   nullptr, nullptr};
 };
 
 MemoryDisk::MemoryDisk(const std::string& name) : name_(name) {

@@ -23,7 +23,11 @@ FaultSite KillOf(TurnPoint point) {
 }  // namespace
 
 Night::Night(const Draws& draws, const NightOptions& options)
-    : draws_(draws), options_(options), now_(kBegin), start_at_(kBegin), frozen_until_(kBegin),
+    : draws_(draws),
+      options_(options),
+      now_(kBegin),
+      start_at_(kBegin),
+      frozen_until_(kBegin),
       look_at_(kBegin) {
   t_virtual_time = {.host_ns = kBegin.ns};
   result_.seed = draws.seed;
@@ -43,18 +47,16 @@ Night::Night(const Draws& draws, const NightOptions& options)
                            .reached = &reached_,
                            .host = [this](FaultSite site) { OfHost(site); }},
       now_);
-  operators_ = std::make_unique<Operators>(
-      Operators::Parts{.draws = &draws_,
-                       .plant = plant_.get(),
-                       .judge = judge_.get(),
-                       .reached = &reached_,
-                       .put =
-                           [this](std::uint64_t client, const std::string& line) {
-                             if (life_ != nullptr) life_->Put(client, line);
-                           },
-                       .is_busy = [this] {
-                         return life_ != nullptr && life_->coordinator().busy();
-                       }});
+  operators_ = std::make_unique<Operators>(Operators::Parts{
+      .draws = &draws_,
+      .plant = plant_.get(),
+      .judge = judge_.get(),
+      .reached = &reached_,
+      .put =
+          [this](std::uint64_t client, const std::string& line) {
+            if (life_ != nullptr) life_->Put(client, line);
+          },
+      .is_busy = [this] { return life_ != nullptr && life_->coordinator().busy(); }});
   disk_->fails = [this](DiskOperation operation) { return OfDisk(operation); };
 }
 
@@ -81,8 +83,7 @@ Surroundings Night::Around() {
     return DurationNs{1 + static_cast<std::int64_t>(mean_ns * faults_->rng()->Uniform(0.5, 1.5))};
   };
   around.plan_takes = [this] {
-    if (faults_->Happens(kPlannerSlow, 50))
-      return Seconds(faults_->rng()->Uniform(5, 60));
+    if (faults_->Happens(kPlannerSlow, 50)) return Seconds(faults_->rng()->Uniform(5, 60));
     return draws_.plan;
   };
   around.planner_fails = [this] { return faults_->Happens(kPlannerFails, 50); };
@@ -98,8 +99,8 @@ Surroundings Night::Around() {
   around.starts = [this](const StoredFleet& stored, const CoordinatorConfig& config) {
     replayer_.reset();
     if (options_.replay)
-      replayer_ = std::make_unique<journal::Replayer>(journal::Replayer::Start{
-          &plant_->layout(), plant_->drives(), config, stored});
+      replayer_ = std::make_unique<journal::Replayer>(
+          journal::Replayer::Start{&plant_->layout(), plant_->drives(), config, stored});
   };
   around.stepped = [this](const Inputs& inputs, const Effects& effects) {
     if (replayer_ == nullptr) return;

@@ -67,8 +67,9 @@ class NightCamera::Port final : public CameraPort {
     const sim::CameraTraits traits;
     const sim::Image image = sim::TakeImage(lights, traits, options_.rng);
     const std::int64_t taken_ns = ReadVirtualWall().ns - (late ? kOldNs : 0);
-    Exposure exposure{
-        .id = "exposure-" + std::to_string(ReadVirtualNs()), .taken_unix_ns = taken_ns, .spots = {}};
+    Exposure exposure{.id = "exposure-" + std::to_string(ReadVirtualNs()),
+                      .taken_unix_ns = taken_ns,
+                      .spots = {}};
     for (const sim::ImageSpot& spot : image.spots) {
       const std::complex<double> at{spot.x_px, spot.y_px};
       const std::complex<double> seen = turned ? traits.sensor_px - 1.0 - at : at;

@@ -1,5 +1,5 @@
-// The camera of a simulated night: the daemon's camera worker, polled on virtual time, and behind it
-// a fibre-view camera over the simulated plate with the faults that cameras have.
+// The camera of a simulated night: the daemon's camera worker, polled on virtual time, and behind
+// it a fibre-view camera over the simulated plate with the faults that cameras have.
 #pragma once
 
 #include <deque>

@@ -1,5 +1,5 @@
-// The second phase of a night: what is broken is mended, operators do what the runbook says, and the
-// fleet must then carry out a configuration.
+// The second phase of a night: what is broken is mended, operators do what the runbook says, and
+// the fleet must then carry out a configuration.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +21,8 @@ std::vector<std::uint32_t> Night::UnitsThat(
   std::vector<std::uint32_t> units;
   if (life_ == nullptr) return units;
   for (std::uint32_t n = 0; n < plant_->layout().size(); ++n)
-    if (wanted(life_->coordinator().unit({n}))) units.push_back(plant_->layout().unit({n}).id.value);
+    if (wanted(life_->coordinator().unit({n})))
+      units.push_back(plant_->layout().unit({n}).id.value);
   return units;
 }
 
@@ -37,7 +38,8 @@ bool Night::Settle(double seconds) {
     return UnitsThat([](const UnitView& unit) {
              return unit.phase != UnitPhase::kReady && unit.phase != UnitPhase::kFault &&
                     unit.phase != UnitPhase::kForeign;
-           }).empty();
+           })
+        .empty();
   };
   RunUntil(now_ + Seconds(seconds), settled);
   return settled();
@@ -60,19 +62,18 @@ void Night::Converge() {
       });
       std::string which;
       for (const std::uint32_t unit : units)
-        which += fmt::format(" {} ({})", unit,
-                             Name(life_->coordinator().unit(
-                                 *plant_->layout().Find(UnitId{unit})).phase));
-      return judge_->Broken("liveness",
-                            fmt::format("not settled: busy {}, units not asked:{}",
-                                        life_->coordinator().busy(), which));
+        which += fmt::format(
+            " {} ({})", unit,
+            Name(life_->coordinator().unit(*plant_->layout().Find(UnitId{unit})).phase));
+      return judge_->Broken("liveness", fmt::format("not settled: busy {}, units not asked:{}",
+                                                    life_->coordinator().busy(), which));
     }
   }
   SetRight();
   if (judge_->broken().empty()) CheckEnd();
 }
 
-/// What an operator does by the runbook: faults are cleared, hardware is adopted, units are homed.
+/// The operator follows the runbook: faults are cleared, hardware is adopted, units are homed.
 void Night::SetRight() {
   const auto all = [](const UnitView&) { return true; };
   WaitFor(operators_->Ask("enable", {{"unit_ids", UnitsThat(all)}}), 30);
@@ -133,8 +134,8 @@ void Night::CheckEnd() {
   RunUntil(now_ + Seconds(3), [] { return false; });
   if (!judge_->broken().empty()) return;
   if (!judge_->acknowledged().intents.empty())
-    judge_->Broken("liveness", fmt::format("{} intents stay open",
-                                           judge_->acknowledged().intents.size()));
+    judge_->Broken("liveness",
+                   fmt::format("{} intents stay open", judge_->acknowledged().intents.size()));
   for (std::size_t row = 0; row < plant_->layout().size(); ++row)
     if (!judge_->OffPlace(row))
       judge_->Broken("liveness", fmt::format("unit {} has no exact place in the store",

@@ -43,8 +43,7 @@ std::uint64_t Operators::Ask(const std::string& verb, Json args) {
   if (args.contains("unit_id")) open_[client].unit = UnitId{args["unit_id"].get<std::uint32_t>()};
   if (args.contains("unit_ids") && args["unit_ids"].size() == 1)
     open_[client].unit = UnitId{args["unit_ids"][0].get<std::uint32_t>()};
-  if (verb == "stop")
-    parts_.judge->StopOrdered(HostInstant{ReadVirtualNs()}, open_[client].unit);
+  if (verb == "stop") parts_.judge->StopOrdered(HostInstant{ReadVirtualNs()}, open_[client].unit);
   parts_.put(client, EncodeRequest({client, verb, std::move(args)}));
   return client;
 }
@@ -133,8 +132,7 @@ bool Operators::Hear(std::uint64_t client, std::string_view line, bool last) {
   const auto found = open_.find(client);
   if (found == open_.end() || found->second.gone) return false;
   if (!last) return true;
-  for (const char c : line)
-    digest_ = (digest_ ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+  for (const char c : line) digest_ = (digest_ ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
   ++answered_;
   auto answer = DecodeAnswer(line);
   if (!answer) {
@@ -156,7 +154,7 @@ void Operators::CheckAnswer(const Open& open, const ControlAnswer& answer) {
   const auto unit = units.find(open.unit->value);
   const bool enabled = unit == units.end() || unit->second.enabled;
   if (enabled != (open.verb == "enable"))
-    parts_.judge->Broken("told", fmt::format("{} of unit {} is answered and not stored", open.verb,
+    parts_.judge->Broken("reported", fmt::format("{} of unit {} is answered and not stored", open.verb,
                                              open.unit->value));
 }
 

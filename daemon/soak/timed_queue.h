@@ -19,7 +19,7 @@ class TimedQueue final : public JobQueue<Job, Answer> {
  public:
   struct Options {
     std::function<Answer(const Job&)> work;
-    std::function<DurationNs()> takes;              // the time of the next job
+    std::function<DurationNs()> takes;  // the time of the next job
     std::function<bool()> has_room = [] { return true; };
   };
   explicit TimedQueue(Options options) : options_(std::move(options)) {}

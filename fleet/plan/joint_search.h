@@ -80,7 +80,7 @@ class JointSearch {
   [[nodiscard]] std::optional<Found> LayOut() const;
 
   Question q_;
-  /// The distance at which two members are told apart, with a margin where both ends have it.
+  /// The distance at which two members are distinguished, with a margin where both ends have it.
   std::array<std::array<double, kMembersMax>, kMembersMax> apart_mm_{};
   std::array<Pose, kMembersMax> step_{};
   Tree forward_;

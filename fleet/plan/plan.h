@@ -82,8 +82,9 @@ struct Plan {
   std::string too_near;
   double makespan_s = 0;  // start signal to the last vector, by nominal clocks
   double bound_s = 0;     // no plan can be shorter: the slowest unit's shortest move alone
-  /// No plan can be shorter either: the least time in which these two neighbours get there together,
-  /// whatever all others do. Where no pair needs more than the slowest unit: that unit's time.
+  /// No plan can be shorter either: the least time in which these two neighbours get there
+  /// together, whatever all others do. Where no pair needs more than the slowest unit: that unit's
+  /// time.
   double pair_bound_s = 0;
   std::optional<std::pair<PositionerIndex, PositionerIndex>> pair_bound_by;
   /// With PlanOptions::stall_tolerant: when each stage begins; the places of all units must be

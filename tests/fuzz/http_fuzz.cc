@@ -1,7 +1,7 @@
 // Any bytes as a request to the HTTP door, over a real connection. The door answers by HTTP or
-// closes, whatever comes, and hands nothing to its handlers but a request that shows the token. The first
-// byte says whether the bytes follow a request line that shows a token of a viewer, so that what is
-// behind the door is reached, too.
+// closes, whatever comes, and hands nothing to its handlers but a request that shows the token. The
+// first byte says whether the bytes follow a request line that shows a token of a viewer, so that
+// what is behind the door is reached, too.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -60,8 +60,8 @@ struct Door {
                    }});
     HttpLimits limits;
     limits.first_byte = limits.connection = limits.admitted = std::chrono::milliseconds(2000);
-    server = std::make_unique<HttpServer>(HttpServer::Options{
-        .address = "127.0.0.1", .router = std::move(router), .limits = limits});
+    server = std::make_unique<HttpServer>(
+        HttpServer::Options{.address = "127.0.0.1", .router = std::move(router), .limits = limits});
     while (server->port() == 0) ::usleep(1000);
   }
   ~Door() {

@@ -1,10 +1,10 @@
 // Rules of every command: exit codes of wrong usage, help, JSON, and completion for the whole tree.
 #include "daemon/cli/command_line.h"
-#include "daemon/study/study.h"
 
 #include <gmock/gmock.h>
 
 #include "daemon/cli/completion.h"
+#include "daemon/study/study.h"
 #include "tests/daemon/cli/program.h"
 #include "tests/support/scratch_folder.h"
 
@@ -20,7 +20,9 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::IsSupersetOf;
 
-std::vector<CompletionNode> Nodes() { return cli::WalkCommands(cli::MakeCommandLine(cli::AddStudyCommands)->app); }
+std::vector<CompletionNode> Nodes() {
+  return cli::WalkCommands(cli::MakeCommandLine(cli::AddStudyCommands)->app);
+}
 
 std::vector<std::string> Words(const std::string& path) {
   return path.empty() ? std::vector<std::string>{} : CLI::detail::split(path, ' ');

@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "daemon/cli/command_line.h"
-#include "daemon/study/study.h"
 #include "daemon/cli/completion.h"
+#include "daemon/study/study.h"
 #include "tests/daemon/cli/program.h"
 #include "tests/support/scratch_folder.h"
 

@@ -60,10 +60,9 @@ class Alone : public ::testing::Test {
 TEST_F(Alone, StudyCommandsSayWhatIsMissing) {
   const auto result = RunProgram({program_, "diagnose", "night", "--out", "report"});
   EXPECT_EQ(result.exit, 1);
-  EXPECT_NE(
-      result.err.find("diagnose is a command of the program focalfleet-study, which is not "
-                      "installed"),
-      std::string::npos)
+  EXPECT_NE(result.err.find("diagnose is a command of the program focalfleet-study, which is not "
+                            "installed"),
+            std::string::npos)
       << result.err;
 }
 

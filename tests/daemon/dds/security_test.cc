@@ -45,9 +45,7 @@ class DdsSecurity : public ::testing::Test {
                                 " > /dev/null";
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
   }
-  [[nodiscard]] std::string Keys(const std::string& who) const {
-    return folder_ / ("keys/" + who);
-  }
+  [[nodiscard]] std::string Keys(const std::string& who) const { return folder_ / ("keys/" + who); }
   [[nodiscard]] ClientProcess Talker(const std::string& who) const {
     return ClientProcess(
         {TALKER, std::to_string(OwnDomain()), std::to_string(kUnits), "0", Keys(who)});
@@ -117,8 +115,7 @@ TEST_F(DdsSecurity, ExposuresComeFromTheCameraAlone) {
 TEST_F(DdsSecurity, AForgedStatusReachesNobody) {
   const auto monitor = Reader(Keys("monitor"));
   // Units 1 to 100 by somebody without credentials, who came first.
-  const ClientProcess forger(
-      {TALKER, std::to_string(OwnDomain()), std::to_string(kUnits), "0"});
+  const ClientProcess forger({TALKER, std::to_string(OwnDomain()), std::to_string(kUnits), "0"});
   ASSERT_EQ(forger.Line(), "ready");
   EXPECT_EQ(Received(monitor.get(), 0).size(), 0u);
   const ClientProcess talker = Talker("daemon");
@@ -172,9 +169,8 @@ TEST_F(DdsSecurity, CredentialsAreRenewedWithoutAGap) {
   RenewingStatusPublisher publisher(
       {.join = {.join =
                     [this] {
-                      return StatusPublisher::Create({.domain = OwnDomain(),
-                                                      .config_xml = {},
-                                                      .security = Keys("daemon")});
+                      return StatusPublisher::Create(
+                          {.domain = OwnDomain(), .config_xml = {}, .security = Keys("daemon")});
                     }},
        .renews = true,
        .overlap = std::chrono::milliseconds(3000)});

@@ -1,5 +1,5 @@
-// The HTTP door from outside: requests as bytes on a socket, plain and by TLS, with a control socket
-// behind it that repeats what it is asked.
+// The HTTP door from outside: requests as bytes on a socket, plain and by TLS, with a control
+// socket behind it that repeats what it is asked.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -93,10 +93,10 @@ class HttpApiTest : public ::testing::Test {
 
   std::unique_ptr<HttpServer> Serve(std::shared_ptr<TlsContext> tls = nullptr,
                                     HttpLimits limits = {}) {
-    auto router = std::make_shared<HttpRouter>(
-        HttpRouter::Options{.tokens = std::make_shared<TokenRegister>(TokenRegister::Options{
-                                .path = folder_ / "tokens.csv"}),
-                            .tls = tls != nullptr});
+    auto router = std::make_shared<HttpRouter>(HttpRouter::Options{
+        .tokens =
+            std::make_shared<TokenRegister>(TokenRegister::Options{.path = folder_ / "tokens.csv"}),
+        .tls = tls != nullptr});
     AddApiRoutes(folder_ / "s", router.get());
     router->Add({.path = "/", .verb = "", .answer = [](const HttpRequest&, const Caller&) {
                    return HttpAnswer{.body = "page"};
@@ -183,8 +183,7 @@ TEST_F(HttpApiTest, ABodyIsReadOnlyWhereItsRequestWasAdmitted) {
   const std::string large = "{\"targets_csv\":\"" + std::string(1'000'000, 'x') + "\"}";
   EXPECT_THAT(Ask(*server, Post("apply", operator_, large)), StartsWith("HTTP/1.1 200"));
   // The refusal comes before its body has come; the rest is thrown away.
-  EXPECT_THAT(Ask(*server, Post("apply", viewer_, large)),
-              AnyOf(StartsWith("HTTP/1.1 403"), ""));
+  EXPECT_THAT(Ask(*server, Post("apply", viewer_, large)), AnyOf(StartsWith("HTTP/1.1 403"), ""));
   HttpLimits limits;
   limits.body_bytes = 1000;
   const auto small = Serve(nullptr, limits);
@@ -318,7 +317,8 @@ TEST_F(HttpTlsTest, ARenewedCertificateIsTaken) {
   EXPECT_THAT(AskByTls(*server, Post("status", viewer_, "")), StartsWith("/CN=plate "));
   const TlsFiles renewed = MakeCertificate(folder_, "renewed");
   ASSERT_EQ(::rename(renewed.certificate.c_str(), files.certificate.c_str()), 0);
-  EXPECT_THAT(AskByTls(*server, Post("status", viewer_, "")), StartsWith("/CN=plate ")) << "its key is not there yet";
+  EXPECT_THAT(AskByTls(*server, Post("status", viewer_, "")), StartsWith("/CN=plate "))
+      << "its key is not there yet";
   ASSERT_EQ(::rename(renewed.key.c_str(), files.key.c_str()), 0);
   EXPECT_THAT(AskByTls(*server, Post("status", viewer_, "")), StartsWith("/CN=renewed "));
 }

@@ -62,10 +62,10 @@ class RouterTest : public ::testing::Test {
   std::string operator_;
   std::string expired_;
   std::string log_;
-  HttpRouter router_{{.tokens = std::make_shared<TokenRegister>(TokenRegister::Options{
-                          .path = folder_ / "tokens.csv",
-                          .attempts = {.burst = 3, .per_second = 0},
-                          .requests = {.burst = 3, .per_second = 0}}),
+  HttpRouter router_{{.tokens = std::make_shared<TokenRegister>(
+                          TokenRegister::Options{.path = folder_ / "tokens.csv",
+                                                 .attempts = {.burst = 3, .per_second = 0},
+                                                 .requests = {.burst = 3, .per_second = 0}}),
                       .log = [this](const std::string& text) { log_ += text + "\n"; },
                       .now = [] { return kNow; }}};
 };

@@ -9,10 +9,10 @@
 #include <sstream>
 
 #include "daemon/cli/command_line.h"
-#include "daemon/study/study.h"
 #include "daemon/cli/completion.h"
 #include "daemon/process/config_manual.h"
 #include "daemon/simulator/command_line.h"
+#include "daemon/study/study.h"
 #include "tests/daemon/cli/program.h"
 #include "tests/support/scratch_folder.h"
 

@@ -121,11 +121,12 @@ TEST_F(AuditTest, AWholeChainIsWholeAndAnEmptyOneToo) {
 
 TEST_F(AuditTest, EachChangedColumnBreaksTheChain) {
   for (const char* set :
-       {"at_ns = at_ns + 1", "boot_id = 'x'", "door = 'http'", "name = 'uid 77'", "role = 'viewer'",
-        "uid = 77", "uid = NULL", "gid = 77", "pid = 77", "program = 'x'", "address = 'x'",
-        "verb = 'stop'", "request = 'x'", "request_bytes = 77", "request_sha256 = 'x'",
-        "taken = 0", "code = 'x'", "reason = 'x'", "configuration = 77",
-        "previous_sha256 = 'x'", "sha256 = 'x'"}) {
+       {"at_ns = at_ns + 1", "boot_id = 'x'",      "door = 'http'",        "name = 'uid 77'",
+        "role = 'viewer'",   "uid = 77",           "uid = NULL",           "gid = 77",
+        "pid = 77",          "program = 'x'",      "address = 'x'",        "verb = 'stop'",
+        "request = 'x'",     "request_bytes = 77", "request_sha256 = 'x'", "taken = 0",
+        "code = 'x'",        "reason = 'x'",       "configuration = 77",   "previous_sha256 = 'x'",
+        "sha256 = 'x'"}) {
     SCOPED_TRACE(set);
     for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(Path() + suffix);
     Fill();
@@ -169,8 +170,9 @@ TEST_F(AuditTest, ACutTailWithItsCountIsFoundByAHeadReportedOutside) {
     auto connection = store_internal::Connection::Open(
         Path(), store_internal::Connection::Mode::kWrite, nullptr, 1000);
     ASSERT_TRUE(connection);
-    ExpectDone((*connection)->Execute("UPDATE meta SET value = 3, checksum = row_checksum(key, 3) "
-                                      "WHERE key = 'audit_entries'"));
+    ExpectDone((*connection)
+                   ->Execute("UPDATE meta SET value = 3, checksum = row_checksum(key, 3) "
+                             "WHERE key = 'audit_entries'"));
   }
   EXPECT_EQ(Flaw(), "") << "the file alone cannot show it";
   EXPECT_THAT(Check({reported}).flaw.value_or(""), HasSubstr("its tail was cut off"));
@@ -179,7 +181,8 @@ TEST_F(AuditTest, ACutTailWithItsCountIsFoundByAHeadReportedOutside) {
 TEST_F(AuditTest, AChainThatWasMadeAnewIsFoundByAHeadReportedOutside) {
   Fill();
   const AuditHead reported{4, std::string(64, '7')};
-  EXPECT_THAT(Check({reported}).flaw.value_or(""), HasSubstr("not the one that was reported outside"));
+  EXPECT_THAT(Check({reported}).flaw.value_or(""),
+              HasSubstr("not the one that was reported outside"));
 }
 
 TEST_F(AuditTest, HeadsAreTexts) {

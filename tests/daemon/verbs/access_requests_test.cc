@@ -36,21 +36,21 @@ std::string Line(const std::string& verb, const Json& args = Json::object()) {
 class AccessRequests : public ::testing::Test {
  protected:
   AccessRequests()
-      : handler_(LineServer::Create(scratch_ / "s",
-                                    {.urgent = &RequestHandler::IsStop,
-                                     .role_of = [this](const auto&) { return role_; },
-                                     .turned_away =
-                                         [this](const Caller& caller) {
-                                           turned_away_ += Describe(caller) + "\n";
-                                         }})
-                     .value(),
-                 {.facts = [] { return ShellFacts{}; },
-                  .log = [this](const std::string& text) { log_ += text + "\n"; },
-                  .store_path = scratch_ / "none.db",
-                  .models = &models_,
-                  .alarms = &alarms_,
-                  .audit = &audit_,
-                  .own_pid = static_cast<std::uint32_t>(::getpid())}) {}
+      : handler_(
+            LineServer::Create(scratch_ / "s", {.urgent = &RequestHandler::IsStop,
+                                                .role_of = [this](const auto&) { return role_; },
+                                                .turned_away =
+                                                    [this](const Caller& caller) {
+                                                      turned_away_ += Describe(caller) + "\n";
+                                                    }})
+                .value(),
+            {.facts = [] { return ShellFacts{}; },
+             .log = [this](const std::string& text) { log_ += text + "\n"; },
+             .store_path = scratch_ / "none.db",
+             .models = &models_,
+             .alarms = &alarms_,
+             .audit = &audit_,
+             .own_pid = static_cast<std::uint32_t>(::getpid())}) {}
 
   /// The answer to what a newcomer of this role says.
   std::string Ask(Role role, const std::string& says) {
@@ -103,9 +103,9 @@ TEST_F(AccessRequests, NobodyGetsAPlaceWithoutARole) {
 }
 
 TEST_F(AccessRequests, ACallerLearnsItsRole) {
-  EXPECT_THAT(Ask(Role::kOperator, Line("access")),
-              AllOf(HasSubstr(R"("role":"operator")"),
-                    HasSubstr("uid " + std::to_string(::geteuid()))));
+  EXPECT_THAT(
+      Ask(Role::kOperator, Line("access")),
+      AllOf(HasSubstr(R"("role":"operator")"), HasSubstr("uid " + std::to_string(::geteuid()))));
 }
 
 TEST_F(AccessRequests, ARefusalIsNamedLoggedAndKept) {
@@ -185,10 +185,11 @@ TEST_F(AccessRequests, TheDaemonItselfAsksOnBehalfOfATokensBearer) {
 
 TEST_F(AccessRequests, NobodyElseAsksOnBehalfOfOthers) {
   const std::string says =
-      EncodeRequest({.id = 1,
-                     .verb = "adopt",
-                     .args = {{"unit_id", 1}},
-                     .caller = Caller{.role = Role::kEngineer, .door = Door::kHttp, .token = "x"}}) +
+      EncodeRequest(
+          {.id = 1,
+           .verb = "adopt",
+           .args = {{"unit_id", 1}},
+           .caller = Caller{.role = Role::kEngineer, .door = Door::kHttp, .token = "x"}}) +
       "\n";
   const pid_t other = ::fork();
   ASSERT_GE(other, 0);
