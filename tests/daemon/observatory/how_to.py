@@ -149,7 +149,7 @@ def broken_files():
                  ("calib.csv", "length_r1", "length", ["calib.csv:1: column length_r1 is missing"])],
         "sdss": [("positionerTable.csv", "R+0C3", "R+9C3", ["positionerTable.csv:5: column holeID: 'R+9C3'"]),
                  ("wokCoords.csv", ",1,0,0,0,0,1", ",-1,0,0,0,0,1", ["its axes i, j are mirrored"]),
-                 ("confSummary.par", "FIBERMAP 5 ", "FIBERMAP 5 5 ", ["confSummary.par:", "FIBERMAP: "])],
+                 ("confSummary.par", "FIBERMAP 5 ", "FIBERMAP 5 5 ", ["confSummary.par:35: field mag: 1 elements are not 5"])],
         "pfs": [("SC01.xml", "<Positioner_Id>2<", "<Positioner_Id>1<",
                  ["SC01.xml:28: unit SC1 PID1: is there twice"]),
                 ("SC01.xml", "<Pixel_scale>90.0<", "<Pixel_scale>0<",
