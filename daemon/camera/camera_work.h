@@ -58,7 +58,7 @@ class CameraWorker {
   std::unique_ptr<CameraPort> port_;
   Options options_;
   std::vector<SeenExposure> seen_;
-  // Of the job under way.
+  // Begin of the job under way.
   WallTime since_;
   std::chrono::nanoseconds give_up_{0};
   Error trouble_;

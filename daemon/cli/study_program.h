@@ -16,8 +16,9 @@ std::string CommandWord(int argc, const char* const* argv);
 
 /// The program focalfleet: runs focalfleet-study in place of this process where the command is its
 /// own, and otherwise the command (Main). focalfleet-study also has the complete help and
-/// completion; where it is not installed, these are shown without the options of study commands. It
-/// is looked for beside this program, then in ../libexec/focalfleet. Returns the exit code.
+/// completion; where it is not installed, these are shown without the options of study commands.
+/// The program is looked for beside this program, then in ../libexec/focalfleet. Returns the exit
+/// code.
 int RunProgram(int argc, char** argv);
 
 }  // namespace focalfleet::cli

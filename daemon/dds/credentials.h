@@ -6,7 +6,7 @@
 //   governance.p7s, permissions.p7s        the rules of the domain, and what this participant may
 //
 // DDS reads them when a participant is made, never again. When one of them ends, DDS cuts the
-// participant off and reports nothing; a write still succeeds. So the ends are looked at here.
+// participant off and reports nothing; a write still succeeds. The ends are therefore watched here.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // The fields of plain values, in the order of their declaration, without a list of them: a type
-// that gets a field more is written, read and digested with it. This works for aggregates of up to 18
-// fields, for the containers that they have, and for strong ids.
+// that gets a field more is written, read and digested with it. This works for aggregates of up to
+// 18 fields, for the containers that they have, and for strong ids.
 //
 //   WriteFields(value, &bytes);            as bytes, little-endian as this machine is
 //   ReadFields(&reader, &value);           back again; false: the bytes are none of it

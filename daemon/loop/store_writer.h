@@ -9,7 +9,7 @@
 // Waiting batches become one transaction, in order. Thereby the writer falls behind a slow disk by
 // no more than one flush.
 //
-// One thread offers batches and status, and the other one, or the same, takes the turns.
+// A thread offers batches and status, and the other one, or the same, takes the turns.
 #pragma once
 
 #include <atomic>

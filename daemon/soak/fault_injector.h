@@ -1,6 +1,6 @@
 // The injector lets faults of the armed sites happen: those that go by time by itself, those that
-// go by occasions when it is asked. It counts each site that was reached, and notes what a fault
-// touches and until when.
+// go by occasions when it is asked. The injector counts each site that was reached, and notes what
+// a fault touches and until when.
 #pragma once
 
 #include <functional>
@@ -25,7 +25,7 @@ class FaultInjector {
     MemoryDisk* disk = nullptr;
     Troubles* troubles = nullptr;
     FaultCounts* reached = nullptr;
-    /// What the host has to do itself at a fault of it.
+    /// Done by the host itself at a fault of it.
     std::function<void(FaultSite)> host;
   };
   FaultInjector(const Parts& parts, HostInstant now);

@@ -205,17 +205,17 @@ void Judge::Published(const StatusBatch& status) {
       const double step = DegreesPerVector(unit.axis[axis], drive.axis[axis]);
       const auto vectors = std::llround(value.low_deg[axis] / step);
       const auto known = reported_.find(value.serial.value);
-      const bool stored =
-          known != reported_.end() && std::ranges::any_of(known->second, [&](const StoredPlace& place) {
-            return place[axis].witness >= 3 && place[axis].low == vectors;
-          });
+      const bool stored = known != reported_.end() &&
+                          std::ranges::any_of(known->second, [&](const StoredPlace& place) {
+                            return place[axis].witness >= 3 && place[axis].low == vectors;
+                          });
       if (stored) continue;
       const bool last = known != reported_.end() && !known->second.empty();
       const StoredAxis newest = last ? known->second.back()[axis] : StoredAxis{};
       Broken("reported", fmt::format("unit {} axis {} is reported to be {} at {}, which was never "
-                                 "acknowledged; stored is witness {} at {}..{}",
-                                 value.unit.value, axis, Name(value.witness[axis]), vectors,
-                                 newest.witness, newest.low, newest.high));
+                                     "acknowledged; stored is witness {} at {}..{}",
+                                     value.unit.value, axis, Name(value.witness[axis]), vectors,
+                                     newest.witness, newest.low, newest.high));
     }
   }
 }

@@ -1,6 +1,7 @@
 // The judge looks at a run from outside: at frames where a host gives them to its buses, at the
-// disk as a power cut would leave it, at what is reported to readers and operators, and at where the
-// units truly are. It shares no code with the daemon's store, knowledge or planning. Its rules:
+// disk as a power cut would leave it, at what is reported to readers and operators, and at where
+// the units truly are. The judge shares no code with the daemon's store, knowledge or planning. Its
+// rules:
 //
 //   start      A unit begins a move only where an intent for it was durable when the start signal,
 //              or the order to home, was given to a bus; and the stored place was exact, unless it
@@ -87,11 +88,11 @@ class Judge {
   PictureReader reader_;
   std::optional<StoredPicture> durable_;
   std::uint64_t durable_syncs_ = UINT64_MAX;
-  StoredPicture shadow_;                                   // acknowledged
-  std::optional<StoredPicture> in_flight_;                 // with the batch that is being committed
+  StoredPicture shadow_;                    // acknowledged
+  std::optional<StoredPicture> in_flight_;  // with the batch that is being committed
   std::map<std::uint32_t, std::deque<StoredPlace>> reported_;  // acknowledged places, newest last
-  using Move = std::pair<std::uint32_t, std::uint32_t>;    // unit, move
-  std::set<Move> allowed_;                                 // by a durable intent
+  using Move = std::pair<std::uint32_t, std::uint32_t>;        // unit, move
+  std::set<Move> allowed_;                                     // by a durable intent
   std::set<Move> blind_;  // whose intent was acknowledged while the unit's place was not exact
   std::vector<Seen> seen_;
   std::vector<std::vector<std::size_t>> near_;

@@ -20,15 +20,13 @@ struct MemoryDisk::Handle {
   bool shm;
 
   [[nodiscard]] bool dead() const { return life != disk->life_; }
+  static Handle* Of(sqlite3_file* file) { return reinterpret_cast<Handle*>(file); }
 };
 
 struct MemoryDisk::Layer {
-  static Handle* Of(sqlite3_file* file) { return reinterpret_cast<Handle*>(file); }
-  static MemoryDisk* Of(sqlite3_vfs* vfs) { return static_cast<MemoryDisk*>(vfs->pAppData); }
-
   static int Open(sqlite3_vfs* vfs, const char* name, sqlite3_file* file, int flags, int* out) {
-    MemoryDisk* disk = Of(vfs);
-    Handle* handle = Of(file);
+    MemoryDisk* disk = static_cast<MemoryDisk*>(vfs->pAppData);
+    Handle* handle = Handle::Of(file);
     *handle = Handle{};
     if (const int code = disk->fails(DiskOperation::kOpen); code != SQLITE_OK) return code;
     const std::string path = name == nullptr ? "temporary" : name;
@@ -48,7 +46,7 @@ struct MemoryDisk::Layer {
     return SQLITE_OK;
   }
   static int Delete(sqlite3_vfs* vfs, const char* name, int) {
-    MemoryDisk* disk = Of(vfs);
+    MemoryDisk* disk = static_cast<MemoryDisk*>(vfs->pAppData);
     const auto found = disk->files_.find(name);
     if (found == disk->files_.end()) return SQLITE_IOERR_DELETE_NOENT;
     if (const int code = disk->fails(DiskOperation::kWrite); code != SQLITE_OK) return code;
@@ -58,7 +56,7 @@ struct MemoryDisk::Layer {
     return SQLITE_OK;
   }
   static int Access(sqlite3_vfs* vfs, const char* name, int, int* out) {
-    *out = Of(vfs)->files_.contains(name) ? 1 : 0;
+    *out = static_cast<MemoryDisk*>(vfs->pAppData)->files_.contains(name) ? 1 : 0;
     return SQLITE_OK;
   }
   static int FullPath(sqlite3_vfs*, const char* name, int size, char* out) {
@@ -77,7 +75,7 @@ struct MemoryDisk::Layer {
   static int LastError(sqlite3_vfs*, int, char*) { return 0; }
 
   static int Close(sqlite3_file* file) {
-    Handle* handle = Of(file);
+    Handle* handle = Handle::Of(file);
     if (handle->dead()) return SQLITE_OK;
     Unlock(file, SQLITE_LOCK_NONE);
     ShmUnmap(file, 0);
@@ -88,7 +86,7 @@ struct MemoryDisk::Layer {
     return handle->disk->fails(operation);
   }
   static int Read(sqlite3_file* file, void* out, int size, sqlite3_int64 offset) {
-    const Handle* handle = Of(file);
+    const Handle* handle = Handle::Of(file);
     if (const int code = Begin(handle, DiskOperation::kRead, SQLITE_IOERR_READ); code != SQLITE_OK)
       return code;
     const std::string& content = handle->file->written;
@@ -100,7 +98,7 @@ struct MemoryDisk::Layer {
     return there == wanted ? SQLITE_OK : SQLITE_IOERR_SHORT_READ;
   }
   static int Write(sqlite3_file* file, const void* data, int size, sqlite3_int64 offset) {
-    const Handle* handle = Of(file);
+    const Handle* handle = Handle::Of(file);
     if (const int code = Begin(handle, DiskOperation::kWrite, SQLITE_IOERR_WRITE);
         code != SQLITE_OK)
       return code;
@@ -117,7 +115,7 @@ struct MemoryDisk::Layer {
     return SQLITE_OK;
   }
   static int Truncate(sqlite3_file* file, sqlite3_int64 size) {
-    const Handle* handle = Of(file);
+    const Handle* handle = Handle::Of(file);
     if (const int code = Begin(handle, DiskOperation::kTruncate, SQLITE_IOERR_TRUNCATE);
         code != SQLITE_OK)
       return code;
@@ -127,7 +125,7 @@ struct MemoryDisk::Layer {
     return SQLITE_OK;
   }
   static int Sync(sqlite3_file* file, int) {
-    const Handle* handle = Of(file);
+    const Handle* handle = Handle::Of(file);
     if (handle->dead()) return SQLITE_IOERR_FSYNC;
     if (const int code = handle->disk->fails(DiskOperation::kSync); code != SQLITE_OK) {
       for (Change& change : handle->file->unsynced)
@@ -142,14 +140,14 @@ struct MemoryDisk::Layer {
     return SQLITE_OK;
   }
   static int Size(sqlite3_file* file, sqlite3_int64* out) {
-    const Handle* handle = Of(file);
+    const Handle* handle = Handle::Of(file);
     if (const int code = Begin(handle, DiskOperation::kRead, SQLITE_IOERR_FSTAT); code != SQLITE_OK)
       return code;
     *out = static_cast<sqlite3_int64>(handle->file->written.size());
     return SQLITE_OK;
   }
   static int Lock(sqlite3_file* file, int level) {
-    Handle* handle = Of(file);
+    Handle* handle = Handle::Of(file);
     if (handle->dead()) return SQLITE_IOERR_LOCK;
     File* of = handle->file;
     if (level <= handle->level) return SQLITE_OK;
@@ -168,7 +166,7 @@ struct MemoryDisk::Layer {
     return SQLITE_OK;
   }
   static int Unlock(sqlite3_file* file, int level) {
-    Handle* handle = Of(file);
+    Handle* handle = Handle::Of(file);
     if (handle->dead() || level >= handle->level) return SQLITE_OK;
     File* of = handle->file;
     if (of->exclusive == handle) of->exclusive = nullptr;
@@ -178,7 +176,7 @@ struct MemoryDisk::Layer {
     return SQLITE_OK;
   }
   static int Reserved(sqlite3_file* file, int* out) {
-    *out = Of(file)->file->reserved != nullptr ? 1 : 0;
+    *out = Handle::Of(file)->file->reserved != nullptr ? 1 : 0;
     return SQLITE_OK;
   }
   static int Control(sqlite3_file*, int what, void* argument) {
@@ -190,7 +188,7 @@ struct MemoryDisk::Layer {
   static int Device(sqlite3_file*) { return SQLITE_IOCAP_POWERSAFE_OVERWRITE; }
 
   static int ShmMap(sqlite3_file* file, int page, int size, int extend, void volatile** out) {
-    Handle* handle = Of(file);
+    Handle* handle = Handle::Of(file);
     *out = nullptr;
     if (handle->dead()) return SQLITE_IOERR_SHMMAP;
     auto& regions = handle->file->regions;
@@ -203,7 +201,7 @@ struct MemoryDisk::Layer {
     return SQLITE_OK;
   }
   static int ShmLock(sqlite3_file* file, int offset, int n, int flags) {
-    Handle* handle = Of(file);
+    Handle* handle = Handle::Of(file);
     if (handle->dead()) return SQLITE_IOERR_SHMLOCK;
     File* of = handle->file;
     const auto slots = [&](const auto& each) {
@@ -240,7 +238,7 @@ struct MemoryDisk::Layer {
   }
   static void ShmBarrier(sqlite3_file*) {}
   static int ShmUnmap(sqlite3_file* file, int) {
-    Handle* handle = Of(file);
+    Handle* handle = Handle::Of(file);
     if (handle->dead() || !handle->shm) return SQLITE_OK;
     ShmLock(file, 0, SQLITE_SHM_NLOCK, SQLITE_SHM_UNLOCK | SQLITE_SHM_SHARED);
     handle->shm = false;

@@ -62,12 +62,13 @@ Night::Night(const Draws& draws, const NightOptions& options)
 
 int Night::OfDisk(DiskOperation operation) {
   const bool writes = operation == DiskOperation::kWrite || operation == DiskOperation::kSync;
-  if (!dying_ && in_start_ && faults_->Happens(kKillInStart, 0.3)) dying_ = kKillInStart;
-  if (!dying_ && !in_start_ && writes && faults_->Happens(kKillInCommit, 0.3)) {
-    dying_ = kKillInCommit;
-    power_cut_ = faults_->rng()->Below(2) == 0;
+  if (!death_.dying && death_.in_start && faults_->Happens(kKillInStart, 0.3))
+    death_.dying = kKillInStart;
+  if (!death_.dying && !death_.in_start && writes && faults_->Happens(kKillInCommit, 0.3)) {
+    death_.dying = kKillInCommit;
+    death_.power_cut = faults_->rng()->Below(2) == 0;
   }
-  if (!dying_) return faults_->Disk(operation);
+  if (!death_.dying) return faults_->Disk(operation);
   disk_->Kill();
   return SQLITE_IOERR;
 }
@@ -135,7 +136,7 @@ void Night::Passed(TurnPoint point) {
 void Night::Committed(std::span<const Row> rows, bool done) {
   judge_->Committed(rows, done);
   ++(done ? result_.commits : result_.commits_failed);
-  if (dying_) throw Killed{*dying_};
+  if (death_.dying) throw Killed{*death_.dying};
 }
 
 void Night::Sends(BusId bus, const CanFrame& frame) {
@@ -157,14 +158,14 @@ void Night::OfHost(FaultSite site) {
   Rng& rng = *faults_->rng();
   switch (site) {
     case kHostPowerCut:
-      power_cut_ = true;
+      death_.power_cut = true;
       return Die(site);
     case kHostEnds:
       if (life_ == nullptr) return;
       Tell("the host is ended");
       try {
         static_cast<void>(life_->End());
-        if (dying_) throw Killed{*dying_};
+        if (death_.dying) throw Killed{*death_.dying};
       } catch (const Killed& killed) {
         return Die(killed.site);
       }
@@ -185,11 +186,11 @@ void Night::OfHost(FaultSite site) {
 }
 
 void Night::StartLife() {
-  in_start_ = true;
+  death_.in_start = true;
   judge_->LifeBegins();
   try {
     auto life = Life::Start(Around());
-    if (dying_) throw Killed{*dying_};
+    if (death_.dying) throw Killed{*death_.dying};
     if (life) {
       life_ = std::move(*life);
       ++result_.lives;
@@ -204,18 +205,18 @@ void Night::StartLife() {
   } catch (const Killed& killed) {
     Die(killed.site);
   }
-  in_start_ = false;
+  death_.in_start = false;
 }
 
 void Night::Die(FaultSite site) {
   Tell(fmt::format("the host dies at {}", Name(site)));
-  if (std::exchange(power_cut_, false))
+  if (std::exchange(death_.power_cut, false))
     disk_->CutPower(faults_->rng());
   else
     disk_->Kill();
   if (life_ != nullptr) result_.steps += life_->steps();
   life_.reset();
-  dying_.reset();
+  death_.dying.reset();
   operators_->DaemonDied();
   start_at_ = now_ + Seconds(0.1 * std::exp(faults_->rng()->Uniform() * 5));
   Troubles::Until(start_at_ + Seconds(5), &troubles_.host);
@@ -224,7 +225,7 @@ void Night::Die(FaultSite site) {
 void Night::TurnOfLife() {
   try {
     life_->Turn();
-    if (dying_) throw Killed{*dying_};
+    if (death_.dying) throw Killed{*death_.dying};
     judge_->Queues(life_->writer().waiting(), life_->lines().Facts());
   } catch (const Killed& killed) {
     Die(killed.site);

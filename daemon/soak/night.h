@@ -37,7 +37,7 @@ struct NightResult {
 };
 
 struct NightOptions {
-  /// One line for each change of state; none: nothing is reported.
+  /// Takes a line for each change of state; none: nothing is reported.
   std::function<void(const std::string&)> tell;
   /// Each step of each life is taken again by another coordinator, which must decide the same.
   bool replay = false;
@@ -88,10 +88,13 @@ class Night {
   HostInstant start_at_;
   HostInstant frozen_until_;
   HostInstant look_at_;
-  bool power_cut_ = false;  // the next death is one of the host's power
-  bool in_start_ = false;
-  std::optional<FaultSite> dying_;  // within SQLite, which cannot be left by an exception
-  std::string state_;               // as last reported
+  /// The end of the present life.
+  struct Death {
+    bool power_cut = false;  // it is one of the host's power
+    bool in_start = false;
+    std::optional<FaultSite> dying = {};  // within SQLite, which cannot be left by an exception
+  } death_;
+  std::string state_;                            // as last reported
   std::unique_ptr<journal::Replayer> replayer_;  // of this life; none: it is not replayed
   std::uint64_t digest_ = 0xcbf29ce484222325u;
 };

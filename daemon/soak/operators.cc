@@ -154,8 +154,8 @@ void Operators::CheckAnswer(const Open& open, const ControlAnswer& answer) {
   const auto unit = units.find(open.unit->value);
   const bool enabled = unit == units.end() || unit->second.enabled;
   if (enabled != (open.verb == "enable"))
-    parts_.judge->Broken("reported", fmt::format("{} of unit {} is answered and not stored", open.verb,
-                                             open.unit->value));
+    parts_.judge->Broken("reported", fmt::format("{} of unit {} is answered and not stored",
+                                                 open.verb, open.unit->value));
 }
 
 }  // namespace focalfleet::soak

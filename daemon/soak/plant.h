@@ -1,5 +1,5 @@
 // The plant is everything on the far side of the buses: the simulated fleet, and what of each bus a
-// host would hear. It outlives each life of the host.
+// host would hear. The plant outlives each life of the host.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +47,7 @@ class Plant {
 /// A host's port to one bus of the plant.
 class PlantPort final : public PollablePort {
  public:
-  /// What happens to frames on their way; an exception ends the host's life there.
+  /// Events of frames on their way; an exception ends the host's life there.
   struct Hooks {
     std::function<void(BusId, const CanFrame&)> sends;  // before each frame
     std::function<bool()> is_full = [] { return false; };

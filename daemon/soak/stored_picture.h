@@ -1,4 +1,4 @@
-// What a disk says that the fleet is, read by SQL of its own. The judge takes nothing from the
+// The fleet as a disk describes it, read by SQL of its own. The judge takes nothing from the
 // daemon's store: a mistake there must not hide itself here.
 #pragma once
 

@@ -15,7 +15,7 @@ void AddStudyCommands(CommandLine* line) {
 }
 
 int RunStudy(int argc, char** argv) {
-  // A diagnosis takes and frees megabytes thousands of times. By default the C library returns such
+  // A diagnosis takes and frees megabytes thousands of times. The C library otherwise returns such
   // blocks to the kernel, which clears them again: a sixth of the CPU time.
   constexpr int kKept_bytes = 1 << 30;
   mallopt(M_MMAP_THRESHOLD, kKept_bytes);

@@ -61,6 +61,18 @@ bool HasMoved(const ConfigurationView& configuration) {
   return configuration.started != kNever || configuration.makespan_s > 0;
 }
 
+// A sentence on the command, beside the coordinator's own answer.
+std::string NoteOn(const FleetView& view, const Command& command, const ModelRegistry& models) {
+  const auto* adopt = std::get_if<AdoptCommand>(&command.what);
+  if (adopt == nullptr || view.compensation == nullptr || !view.compensation->Knows(adopt->unit))
+    return "";
+  return "; the model in force (" + models.name() +
+         ") was measured on the robot before it, so its commands go without one";
+}
+
+// The answer may take minutes: progress shows the client that the daemon lives.
+bool GetsProgress(const auto& pending) { return pending.wait || pending.is_retarget; }
+
 }  // namespace
 
 void RequestHandler::Service(const FleetView& view, std::vector<Command>* commands) {
@@ -106,13 +118,6 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
   Do(view, line, {*request, for_other ? *request->caller : line.caller}, commands);
 }
 
-Status RequestHandler::Permit(const FleetView& view, const IncomingLine& line, const Asked& asked) {
-  const Status permitted = CheckRight(asked.caller, asked.request.verb, asked.request.args);
-  if (!permitted && permitted.error().code == ErrorCode::kRefused)
-    NoteRefusal(view, line, asked, permitted.error());
-  return permitted;
-}
-
 void RequestHandler::NoteRefusal(const FleetView& view, const IncomingLine& line,
                                  const Asked& asked, const Error& why) {
   const std::string text =
@@ -126,8 +131,11 @@ void RequestHandler::Do(const FleetView& view, const IncomingLine& line, const A
                         std::vector<Command>* commands) {
   const ControlRequest* const request = &asked.request;
   Pending pending{.client = line.client, .id = request->id};
-  if (const Status permitted = Permit(view, line, asked); !permitted)
+  if (const Status permitted = CheckRight(asked.caller, request->verb, request->args); !permitted) {
+    if (permitted.error().code == ErrorCode::kRefused)
+      NoteRefusal(view, line, asked, permitted.error());
     return Answer(pending, tl::unexpected<Error>(permitted.error()));
+  }
   if (request->verb == "access") return Answer(pending, AccessJson(asked.caller));
   if (request->verb == "state") {
     // The answer is spliced in as text, into the frame that EncodeResult makes.
@@ -166,12 +174,12 @@ void RequestHandler::Do(const FleetView& view, const IncomingLine& line, const A
     return Answer(pending, tl::unexpected<Error>(command.error()));
   }
   options_.log(request->verb + " commanded by " + Describe(asked.caller));
-  pending.note = NoteOn(view, *command);
+  pending.note = NoteOn(view, *command, *options_.models);
   command->request = next_request_++;
   if (options_.audit != nullptr)
     options_.audit->Commanded(command->request, asked.caller, request->verb, line.text);
   pending_.emplace(command->request, pending);
-  waiting_ += pending.gets_progress() ? 1u : 0u;
+  waiting_ += GetsProgress(pending) ? 1u : 0u;
   commands->push_back(std::move(*command));
 }
 
@@ -251,14 +259,6 @@ std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view
 }
 
 /// Adopted hardware is not driven by the model of the hardware before it, and the answer says so.
-std::string RequestHandler::NoteOn(const FleetView& view, const Command& command) const {
-  const auto* adopt = std::get_if<AdoptCommand>(&command.what);
-  if (adopt == nullptr || view.compensation == nullptr || !view.compensation->Knows(adopt->unit))
-    return "";
-  return "; the model in force (" + options_.models->name() +
-         ") was measured on the robot before it, so its commands go without one";
-}
-
 Result<StoreReader*> RequestHandler::Reader() {
   if (reader_ == nullptr) {
     FOCALFLEET_TRY_ASSIGN(reader_, StoreReader::Open(options_.store_path, options_.store));
@@ -284,7 +284,7 @@ void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
   it->second.began = true;
   if (!reply.last && (pending.wait || pending.is_retarget)) return;
   pending_.erase(it);
-  waiting_ -= pending.gets_progress() ? 1u : 0u;
+  waiting_ -= GetsProgress(pending) ? 1u : 0u;
   if (reply.error) {
     options_.log("refused or failed: " + reply.error->text);
     if (pending.is_retarget && pending.began)
@@ -385,7 +385,7 @@ void RequestHandler::ShowProgress(const FleetView& view) {
   if (waiting_ == 0) return;
   const Json progress = ProgressJson(view);
   for (const auto& [request, pending] : pending_)
-    if (pending.gets_progress())
+    if (GetsProgress(pending))
       server_->Progress(pending.client, EncodeProgress(pending.id, progress));
 }
 

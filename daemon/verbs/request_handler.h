@@ -109,8 +109,6 @@ class RequestHandler {
     std::string note;              // stands after the answer's text
     std::uint64_t awaits = 0;      // of `wait`: the configuration whose end is the answer
     HostInstant give_up = kNever;  // of `wait`
-    /// Its answer may take minutes: progress shows the client that the daemon lives.
-    [[nodiscard]] bool gets_progress() const { return wait || is_retarget; }
   };
   /// A request, and who makes it.
   struct Asked {
@@ -128,8 +126,6 @@ class RequestHandler {
   void Handle(const FleetView& view, const IncomingLine& line, std::vector<Command>* commands);
   void Do(const FleetView& view, const IncomingLine& line, const Asked& asked,
           std::vector<Command>* commands);
-  /// The caller may ask this. Errors: as CheckRight; the refusal is noted.
-  Status Permit(const FleetView& view, const IncomingLine& line, const Asked& asked);
   /// The refusal is logged and kept.
   void NoteRefusal(const FleetView& view, const IncomingLine& line, const Asked& asked,
                    const Error& why);
@@ -142,7 +138,6 @@ class RequestHandler {
   void Queue(const Pending& pending, Result<StoreReading> reading);
   /// The command that keeps a change of the model; none: the verb changes no model.
   std::optional<Result<Command>> ChangeModel(const FleetView& view, const ControlRequest& request);
-  [[nodiscard]] std::string NoteOn(const FleetView& view, const Command& command) const;
   Result<StoreReader*> Reader();
   void Answer(const Pending& pending, const Result<Json>& result);
   void Send(ClientId client, const std::string& answer);

@@ -71,7 +71,7 @@ class CsvTable {
   [[nodiscard]] std::vector<std::string> Others(
       std::initializer_list<std::string_view> known) const;
   [[nodiscard]] Error ErrorAt(std::size_t row, std::string_view reason) const;
-  /// What makes numbers of the column's declared unit numbers of the unit in its name.
+  /// Makes numbers of the column's declared unit numbers of the unit in its name.
   [[nodiscard]] const UnitConversion& conversion(std::size_t column) const {
     return conversions_[column];
   }

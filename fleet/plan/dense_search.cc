@@ -40,7 +40,7 @@ constexpr double kGoodEnough = 1.005;  // times the bound: nothing is left to ga
 constexpr int kRepairsWithNotice = 12;
 /// A pair that fails so often weighs one conflict more (breakout local search, Morris 1993).
 constexpr int kFailuresPerWeight = 6;
-/// What work costs, in seconds of CPU.
+/// Cost of work, in seconds of CPU.
 constexpr double kExpansionCost_s = 0.6e-6;
 constexpr double kReplanCost_s = 150e-6;
 constexpr double kJointStepCost_s = 0.8e-6;
@@ -281,7 +281,7 @@ void DenseSearch::Begin() {
   std::sort(order.begin(), order.end());
   for (const auto& [end, i] : order) {
     if (IsAbandoned(q_.abandoned) || Replan(i)) continue;
-    // It meets others, but has a way.
+    // The unit meets others, but has a way.
     const AxisPaths straight = Straight(q_.drives[i], q_.from[i], q_.to[i]).path;
     if (motions_.KeepsLimits(i, straight)) Set(i, straight);
   }

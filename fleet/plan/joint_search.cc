@@ -28,7 +28,7 @@ std::int32_t JointSearch::StepsBetween(const Poses& a, const Poses& b) const {
   return most;
 }
 
-/// One step of time on, each axis at its speed until it is there.
+/// A step of time on, each axis at its speed until it is there.
 JointSearch::Poses JointSearch::Towards(const Poses& from, const Poses& to) const {
   Poses next = from;
   for (std::size_t m = 0; m < size(); ++m)

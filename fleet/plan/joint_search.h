@@ -37,7 +37,7 @@ class JointSearch {
   };
   struct Question {
     std::span<const Member> members;  // two or three
-    /// Of members a and b, a < b. Shape: (members, members).
+    /// For members a and b, a < b. Shape: (members, members).
     std::array<std::array<double, kMembersMax>, kMembersMax> need_mm{};
     TimeSteps steps;
     std::int32_t end_step = 0;

@@ -4,8 +4,9 @@
 // some start skew and clock.
 //
 // The raster decides nothing: a cell is as wide as a fraction of an arm, and a motion that it calls
-// clear is proven by its track (track.h). It answers within nanoseconds whether a pose meets
-// anything at each step, where the exact test of all neighbours takes a thousand times as long.
+// clear is proven by its track (track.h). The raster answers within nanoseconds whether a pose
+// meets anything at each step, where the exact test of all neighbours takes a thousand times as
+// long.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +38,7 @@ struct RasterWindow {
   }
 };
 
-/// What a unit's surroundings are like at every step, seen from its own patrol disc.
+/// A unit's surroundings at every step, seen from its own patrol disc.
 struct Surround {
   RasterWindow window;
   std::vector<std::uint64_t> bits;  // Shape: (cells, words)

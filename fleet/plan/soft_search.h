@@ -4,8 +4,8 @@
 // to another cost much, turning costs a little, and waiting costs nothing: a unit that has time
 // waits where it harms no one.
 //
-// What is too near is read from a raster (occupancy.h), so the way found must be proven as a motion
-// in time (track.h).
+// A raster (occupancy.h) tells roughly what is too near, so the way found must be proven as a
+// motion in time (track.h).
 #pragma once
 
 #include <array>
