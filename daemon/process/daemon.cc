@@ -194,7 +194,7 @@ Status Daemon::OpenRequestHandler() {
   doors_.audit = AuditTrail(ReadBootId());
   models_ = std::make_unique<ModelRegistry>(layout_.get());
   doors_.handler = std::make_unique<RequestHandler>(
-      std::move(server),
+      std::make_unique<LineServer>(std::move(server)),
       RequestHandler::Options{.progress_period = clock_.Real(Milliseconds(200)),
                               .second = clock_.Real(Seconds(1)),
                               .facts = [this] { return Facts(); },

@@ -24,7 +24,7 @@ constexpr double kJumpVectors = 60;
 constexpr DurationNs kStopWithin = Milliseconds(150);
 /// A fault that kept a stop from a unit may lead to contact so long after it.
 constexpr DurationNs kContactAfter = Seconds(60);
-constexpr std::size_t kToldMax = 64;
+constexpr std::size_t kReportedMax = 64;
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
 double Cross(Point a, Point b) { return a.real() * b.imag() - a.imag() * b.real(); }
@@ -120,7 +120,7 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
     if (const auto* vector = std::get_if<VectorRow>(&row)) {
       auto& places = reported_[vector->serial.value];
       places.push_back(shadow_.places[vector->serial.value]);
-      if (places.size() > kToldMax) places.pop_front();
+      if (places.size() > kReportedMax) places.pop_front();
     }
 }
 

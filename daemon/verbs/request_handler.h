@@ -56,8 +56,6 @@ class RequestHandler {
   };
   RequestHandler(std::unique_ptr<LineExchange> server, Options options)
       : server_(std::move(server)), options_(std::move(options)) {}
-  RequestHandler(LineServer server, Options options)
-      : RequestHandler(std::make_unique<LineServer>(std::move(server)), std::move(options)) {}
 
   /// Bytes of lines and answers of one turn; the line that exceeds them is the turn's last. A byte
   /// costs 10 to 30 ns, so the budget is about a millisecond. With half of it most answers to

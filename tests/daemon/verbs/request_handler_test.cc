@@ -36,12 +36,14 @@ class RequestHandlerTest : public ::testing::Test {
  protected:
   explicit RequestHandlerTest(std::uint32_t units = 3)
       : fleet_(units),
-        handler_(LineServer::Create(scratch_ / "s", {.urgent = &RequestHandler::IsStop}).value(),
-                 {.facts = [] { return ShellFacts{}; },
-                  .log = [this](const std::string& text) { log_ += text + "\n"; },
-                  .store_path = scratch_ / "none.db",
-                  .models = &models_,
-                  .alarms = &alarms_}) {}
+        handler_(
+            std::make_unique<LineServer>(
+                LineServer::Create(scratch_ / "s", {.urgent = &RequestHandler::IsStop}).value()),
+            {.facts = [] { return ShellFacts{}; },
+             .log = [this](const std::string& text) { log_ += text + "\n"; },
+             .store_path = scratch_ / "none.db",
+             .models = &models_,
+             .alarms = &alarms_}) {}
 
   RawClient& Add(const std::string& says = "") {
     RawClient& client = *clients_.emplace_back(std::make_unique<RawClient>(scratch_ / "s"));
