@@ -36,21 +36,22 @@ std::string Line(const std::string& verb, const Json& args = Json::object()) {
 class AccessRequests : public ::testing::Test {
  protected:
   AccessRequests()
-      : handler_(
-            LineServer::Create(scratch_ / "s", {.urgent = &RequestHandler::IsStop,
-                                                .role_of = [this](const auto&) { return role_; },
-                                                .turned_away =
-                                                    [this](const Caller& caller) {
-                                                      turned_away_ += Describe(caller) + "\n";
-                                                    }})
-                .value(),
-            {.facts = [] { return ShellFacts{}; },
-             .log = [this](const std::string& text) { log_ += text + "\n"; },
-             .store_path = scratch_ / "none.db",
-             .models = &models_,
-             .alarms = &alarms_,
-             .audit = &audit_,
-             .own_pid = static_cast<std::uint32_t>(::getpid())}) {}
+      : handler_(std::make_unique<LineServer>(
+                     LineServer::Create(scratch_ / "s",
+                                        {.urgent = &RequestHandler::IsStop,
+                                         .role_of = [this](const auto&) { return role_; },
+                                         .turned_away =
+                                             [this](const Caller& caller) {
+                                               turned_away_ += Describe(caller) + "\n";
+                                             }})
+                         .value()),
+                 {.facts = [] { return ShellFacts{}; },
+                  .log = [this](const std::string& text) { log_ += text + "\n"; },
+                  .store_path = scratch_ / "none.db",
+                  .models = &models_,
+                  .alarms = &alarms_,
+                  .audit = &audit_,
+                  .own_pid = static_cast<std::uint32_t>(::getpid())}) {}
 
   /// The answer to what a newcomer of this role says.
   std::string Ask(Role role, const std::string& says) {
