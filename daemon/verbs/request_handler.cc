@@ -157,7 +157,8 @@ void RequestHandler::Do(const FleetView& view, const IncomingLine& line, const A
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
   pending.wait = *wait && pending.is_configuration;
   auto change = ChangeModel(view, *request);
-  if (!change) change = ChangeAlarms(*request, options_.alarms, NameOf(asked.caller), WallTime::Now());
+  if (!change)
+    change = ChangeAlarms(*request, options_.alarms, NameOf(asked.caller), WallTime::Now());
   auto command = change ? std::move(*change) : CommandOf(*request, view);
   if (!command) {
     options_.log(request->verb + " refused: " + FirstRow(command.error().text));

@@ -7,8 +7,9 @@
 // its client. A turn with a stop handles no other line, so that the frames of the stop are on the
 // buses before any answer is computed. Where the next turn brings a stop again, other lines are
 // handled too.
-// Each verb takes a role (access/rights.h). A request that its caller may not make is refused, named
-// in the log and kept for the audit, as is each command.
+//
+// Each verb takes a role (access/rights.h). A request that its caller may not make is refused,
+// named in the log and kept for the audit, as is each command.
 //
 // Requests of other verbs share a budget a turn (kTurnBytes); after it, the loop serves buses,
 // signals and the next stop first. Motions that a stop overtook are refused, because the stop was

@@ -1,6 +1,6 @@
 // Any bytes as samples of each topic, as DDS hands them over: numbers of any value, texts that end
-// within their bound. A sample becomes a value of this project whose codes all exist, or is refused.
-// A value that was taken goes out again as the same sample.
+// within their bound. A sample becomes a value of this project whose codes all exist, or is
+// refused. A value that was taken goes out again as a sample that is taken again.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // Any bytes as a request to the HTTP door, over a real connection. The door answers by HTTP or
-// closes, whatever comes, and hands nothing to its handlers but a request that shows the token. The first
-// byte says whether the bytes follow a request line that shows a token of a viewer, so that what is
-// behind the door is reached, too.
+// closes, whatever comes, and hands nothing to its handlers but a request that shows the token. The
+// first byte says whether the bytes follow a request line that shows a token of a viewer, so that
+// the handlers are reached, too.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>

@@ -88,7 +88,8 @@ TEST(Rights, ThePageHasTheSameTable) {
   ASSERT_TRUE(page);
   std::set<std::string> shown;
   for (std::string line; std::getline(page, line);)
-    if (line.starts_with("| `")) shown.insert(line.substr(0, line.find('|', line.find('|', 2) + 1)));
+    if (line.starts_with("| `"))
+      shown.insert(line.substr(0, line.find('|', line.find('|', 2) + 1)));
   std::set<std::string> rows;
   for (const Right& right : Rights()) {
     rows.insert("| `" + std::string(right.verb) + "` | " + Name(right.least) + " ");

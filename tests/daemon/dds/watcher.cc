@@ -39,7 +39,8 @@ int Main(int argc, char** argv) {
     const auto now = Clock::now();
     if (!update.units.empty()) {
       if (samples > 0)
-        longest = std::max(longest, std::chrono::duration_cast<std::chrono::milliseconds>(now - last));
+        longest =
+            std::max(longest, std::chrono::duration_cast<std::chrono::milliseconds>(now - last));
       last = now;
     }
     for (const auto& unit : update.units) units.insert(unit.unit.value);

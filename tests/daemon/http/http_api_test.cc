@@ -1,5 +1,5 @@
-// The HTTP door from outside: requests as bytes on a socket, plain and by TLS, with a control socket
-// behind it that repeats what it is asked.
+// The HTTP door from outside: requests as bytes on a socket, plain and by TLS, with a control
+// socket behind it that repeats what it is asked.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -256,12 +256,13 @@ class HttpTlsTest : public HttpApiTest {
       if (SSL_connect(tls.get()) == 1) {
         const std::unique_ptr<X509, Free> peer(SSL_get1_peer_certificate(tls.get()));
         std::array<char, 100> name{};
-        X509_NAME_oneline(X509_get_subject_name(peer.get()), name.data(), name.size());
+        X509_NAME_oneline(X509_get_subject_name(peer.get()), name.data(),
+                          static_cast<int>(name.size()));
         answer = std::string(name.data()) + " ";
         SSL_write(tls.get(), request.data(), static_cast<int>(request.size()));
         std::array<char, 4096> chunk{};
         for (int got = 1; got > 0;) {
-          got = SSL_read(tls.get(), chunk.data(), chunk.size());
+          got = SSL_read(tls.get(), chunk.data(), static_cast<int>(chunk.size()));
           if (got > 0) answer.append(chunk.data(), static_cast<std::size_t>(got));
         }
       }
@@ -318,7 +319,8 @@ TEST_F(HttpTlsTest, ARenewedCertificateIsTaken) {
   EXPECT_THAT(AskByTls(*server, Post("status", viewer_, "")), StartsWith("/CN=plate "));
   const TlsFiles renewed = MakeCertificate(folder_, "renewed");
   ASSERT_EQ(::rename(renewed.certificate.c_str(), files.certificate.c_str()), 0);
-  EXPECT_THAT(AskByTls(*server, Post("status", viewer_, "")), StartsWith("/CN=plate ")) << "its key is not there yet";
+  EXPECT_THAT(AskByTls(*server, Post("status", viewer_, "")), StartsWith("/CN=plate "))
+      << "its key is not there yet";
   ASSERT_EQ(::rename(renewed.key.c_str(), files.key.c_str()), 0);
   EXPECT_THAT(AskByTls(*server, Post("status", viewer_, "")), StartsWith("/CN=renewed "));
 }

@@ -179,7 +179,8 @@ TEST_F(AuditTest, ACutTailWithItsCountIsFoundByAHeadReportedOutside) {
 TEST_F(AuditTest, AChainThatWasMadeAnewIsFoundByAHeadReportedOutside) {
   Fill();
   const AuditHead reported{4, std::string(64, '7')};
-  EXPECT_THAT(Check({reported}).flaw.value_or(""), HasSubstr("not the one that was reported outside"));
+  EXPECT_THAT(Check({reported}).flaw.value_or(""),
+              HasSubstr("not the one that was reported outside"));
 }
 
 TEST_F(AuditTest, HeadsAreTexts) {

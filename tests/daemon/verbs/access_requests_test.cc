@@ -188,7 +188,8 @@ TEST_F(AccessRequests, NobodyElseAsksOnBehalfOfOthers) {
       EncodeRequest({.id = 1,
                      .verb = "adopt",
                      .args = {{"unit_id", 1}},
-                     .caller = Caller{.role = Role::kEngineer, .door = Door::kHttp, .token = "x"}}) +
+                     .caller = Caller{
+                         .role = Role::kEngineer, .door = Door::kHttp, .token = "x"}}) +
       "\n";
   const pid_t other = ::fork();
   ASSERT_GE(other, 0);
