@@ -255,12 +255,13 @@ class HttpTlsTest : public HttpApiTest {
       if (SSL_connect(tls.get()) == 1) {
         const std::unique_ptr<X509, Free> peer(SSL_get1_peer_certificate(tls.get()));
         std::array<char, 100> name{};
-        X509_NAME_oneline(X509_get_subject_name(peer.get()), name.data(), name.size());
+        X509_NAME_oneline(X509_get_subject_name(peer.get()), name.data(),
+                          static_cast<int>(name.size()));
         answer = std::string(name.data()) + " ";
         SSL_write(tls.get(), request.data(), static_cast<int>(request.size()));
         std::array<char, 4096> chunk{};
         for (int got = 1; got > 0;) {
-          got = SSL_read(tls.get(), chunk.data(), chunk.size());
+          got = SSL_read(tls.get(), chunk.data(), static_cast<int>(chunk.size()));
           if (got > 0) answer.append(chunk.data(), static_cast<std::size_t>(got));
         }
       }
