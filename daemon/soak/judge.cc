@@ -180,6 +180,7 @@ const StoredPicture* Judge::Durable() {
     std::string why;
     durable_ = reader_.Read(disk_->Synced(), &why);
     durable_syncs_ = disk_->syncs();
+    if (!durable_) Broken("durable", "a power cut now would leave no store: " + why);
   }
   return durable_ ? &*durable_ : nullptr;
 }

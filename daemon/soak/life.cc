@@ -14,6 +14,7 @@ namespace focalfleet::soak {
 namespace {
 
 constexpr const char* kStorePath = "store.sqlite";
+constexpr int kPlanLooksMax = 100;
 
 StoreOptions OptionsOf(const MemoryDisk& disk) {
   return {.busy_wait = std::chrono::milliseconds(0), .vfs = disk.name(), .vfs_has_files = true};
@@ -105,7 +106,10 @@ void Life::MakeQueues() {
               [this, layout](const PlannerWork& work) {
                 if (around_.planner_fails())
                   return PlanFailed(work.job, {ErrorCode::kUnavailable, "the planner failed"});
-                return RunPlanJob(work.job, *layout, work.drives);
+                // A search that finds no end is given up after so many looks, not after a time.
+                int looks = 0;
+                return RunPlanJob(work.job, *layout, work.drives,
+                                  [&looks] { return ++looks > kPlanLooksMax; });
               },
           .takes = around_.plan_takes,
           .has_room = around_.planner_has_room});

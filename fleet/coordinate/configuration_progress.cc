@@ -97,7 +97,7 @@ void ConfigurationProgress::OnPlan(const PlanDone& done) {
 }
 
 void ConfigurationProgress::TakePlan(const PlanDone& done) {
-  round_.plan = *done.plan;
+  round_.TakePlan(*done.plan);
   const Plan& plan = round_.plan;
   if (!plan.too_near.empty())
     fleet_.ledger.alarms().Raise(AlarmName::kUnitsTooNear, {}, {},

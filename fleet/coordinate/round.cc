@@ -18,12 +18,12 @@ bool Round::HasParts() const {
 
 UnitPlan* Round::PlanOf(PositionerIndex i) {
   const std::size_t index = units_[i.value].plan;
-  return index < plan.moves.size() ? &plan.moves[index] : nullptr;
+  return index == RoundUnit::kNoPlan ? nullptr : &plan.moves[index];
 }
 
 const UnitPlan* Round::PlanOf(PositionerIndex i) const {
   const std::size_t index = units_[i.value].plan;
-  return index < plan.moves.size() ? &plan.moves[index] : nullptr;
+  return index == RoundUnit::kNoPlan ? nullptr : &plan.moves[index];
 }
 
 MoveId Round::MoveOf(PositionerIndex i) const {
@@ -40,6 +40,12 @@ std::optional<Round::Course> Round::CourseOf(PositionerIndex i) const {
   const UnitPlan* const mine = PlanOf(i);
   if (part(i) != Part::kMoving || mine == nullptr) return std::nullopt;
   return Course{mine, BeganOf(i)};
+}
+
+void Round::TakePlan(const Plan& next) {
+  // A round that was disarmed has not ended: its units still have their numbers.
+  for (RoundUnit& unit : units_) unit.plan = RoundUnit::kNoPlan;
+  plan = next;
 }
 
 void Round::AddLate(PositionerIndex i, const LateMove& late, MoveId move_id) {

@@ -58,6 +58,8 @@ class Round {
   }
   [[nodiscard]] bool HasParts() const;  // some unit has a part in the round
 
+  /// The plan of this round is `next`; no unit has a number of an earlier plan any more.
+  void TakePlan(const Plan& next);
   /// Null: no move of this round.
   [[nodiscard]] UnitPlan* PlanOf(PositionerIndex i);
   [[nodiscard]] const UnitPlan* PlanOf(PositionerIndex i) const;

@@ -46,8 +46,11 @@ void Unit::OnSync(HostInstant now, TransmitQueue* out) {
 void Unit::SpoilFlash(FlashDamage damage) {
   constexpr std::int32_t kEarlierVectors = 1000;
   if (damage == FlashDamage::kNoMark) flash_.moving = false;
-  if (damage == FlashDamage::kOldCounts)
-    for (AxisFlash& axis : flash_.axis) axis.set_position(axis.position() - kEarlierVectors);
+  if (damage != FlashDamage::kOldCounts) return;
+  // An older copy has the move of then, too.
+  for (AxisFlash& axis : flash_.axis) axis.set_position(axis.position() - kEarlierVectors);
+  flash_.last_begun = {};
+  flash_.moving = false;
 }
 
 void Unit::RecordBegun(HostInstant now) {
