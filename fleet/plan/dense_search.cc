@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <set>
 #include <utility>
@@ -18,13 +17,10 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kStepDeg = 6;  // that the quickest unit turns in one step
-/// Units that are planned anew together, at most.
-constexpr std::size_t kChosenMost = 8;
-constexpr std::int32_t kBold = 3;
-/// Repairs of the first plan until more time is allowed: one for so many units, and at least so
-/// many.
-constexpr int kUnitsPerRepair = 2;
+constexpr double kStepDeg = 6;          // that the quickest unit turns in one step
+constexpr std::size_t kChosenMost = 8;  // units that are planned anew together
+constexpr std::int32_t kBold = 3;       // what a step costs in which others are met
+constexpr int kUnitsPerRepair = 2;      // of the first plan, until more time is allowed
 constexpr int kRepairsAtLeast = 100;
 constexpr std::int32_t kExtendBy = 6;  // the time grows by this part of it
 constexpr int kTriesWithMostTime = 3;
@@ -34,10 +30,9 @@ constexpr double kWithinMost = 2;  // times the time of the first plan; it may n
 constexpr int kRepairsPerCut = 120;
 /// A cut is at least this share of the time that is above the bound; each failure halves it.
 constexpr double kCutShare = 0.4;
-constexpr int kFailuresMost = 16;      // in a row, of the smallest cut
-constexpr double kGoodEnough = 1.005;  // times the bound: nothing is left to gain
-/// Repairs of one pair without success, after which it need not be clear with notice.
-constexpr int kRepairsWithNotice = 12;
+constexpr int kFailuresMost = 16;       // in a row, of the smallest cut
+constexpr double kGoodEnough = 1.005;   // times the bound: nothing is left to gain
+constexpr int kRepairsWithNotice = 12;  // then a pair need not be clear with notice
 /// A pair that fails so often weighs one conflict more (breakout local search, Morris 1993).
 constexpr int kFailuresPerWeight = 6;
 /// Cost of work, in seconds of CPU.
@@ -128,32 +123,19 @@ class DenseSearch {
   std::vector<Before> before_cut_;  // of units that were planned anew since the time was cut
   bool in_cut_ = false;
   std::uint64_t replans_ = 0;
-  std::array<Surround, JointSearch::kMembersMax> around_;  // scratch
-  std::vector<MovingNeighbour> moving_;                    // scratch
-  std::vector<std::uint8_t> rests_;                        // scratch
+  // Scratch.
+  std::array<Surround, JointSearch::kMembersMax> around_;
+  std::vector<MovingNeighbour> moving_;
+  std::vector<std::uint8_t> rests_;
 };
 
 TimeSteps DenseSearch::StepsOf(const LocalSearchRequest& q) {
-  constexpr std::int64_t kRoundTicks = 60;  // usual drives turn whole vectors in such a step
-  double step_s = 1e9;
-  for (std::uint32_t i = 0; i < q.scene->size(); ++i) {
-    double own_s = 0;
-    for (const Axis axis : kAxes)
-      own_s = std::max(own_s, kStepDeg * std::numbers::pi / 180 / q.scene->arm(i).step_rad(axis) *
-                                  SecondsPerVector(q.drives[i].axis[Index(axis)]));
-    step_s = std::min(step_s, own_s);
-  }
   double end_s = kWithinMost * q.within_s;
   for (std::uint32_t i = 0; i < q.scene->size() && !q.begin_with.empty(); ++i)
     if (!IsEmpty(q.begin_with[i]) && q.scene->is_place(i))
       end_s =
           std::max(end_s, Track(q.scene->arm(i), q.drives[i], q.from[i], q.begin_with[i]).end_s());
-  TimeSteps steps;
-  steps.ticks =
-      std::max<std::int64_t>(1, std::llround(step_s / kTickS / kRoundTicks)) * kRoundTicks;
-  // A way may need a step more than its time: parts of vectors are left at the end of a step.
-  steps.count = static_cast<std::int32_t>(std::ceil(end_s / steps.step_s())) + 2;
-  return steps;
+  return StepsUntil(*q.scene, q.drives, end_s);
 }
 
 double DenseSearch::End() const {
@@ -373,7 +355,7 @@ bool DenseSearch::Repair(const Pair& pair) {
     // Sometimes a third unit stands between the two.
     const auto near = scene_.neighbours(pair.first);
     const std::uint32_t third = near[rng_.Below(near.size())].unit;
-    if (rng_.Below(4) == 0 && AreNeighbours(third, pair.second)) planned += Choose(third) ? 1 : 0;
+    if (rng_.Below(4) == 0 && AreNeighbours(third, pair.second)) planned += Choose(third) ? 1u : 0u;
     std::array<std::uint32_t, JointSearch::kMembersMax> units{};
     for (std::size_t n = 0; n < planned; ++n) units[n] = chosen_[n].unit;
     ok = ReplanTogether(std::span(units).first(planned));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace focalfleet {
 namespace {
@@ -59,6 +60,29 @@ RowSpan SpanAt(const SegmentFp& line, double radius_mm, double y_mm) {
 }
 
 }  // namespace
+
+TimeSteps StepsUntil(const Scene& scene, std::span<const UnitDrive> drives, double end_s) {
+  constexpr double kStepDeg = 6;
+  constexpr std::int64_t kRoundTicks = 60;  // usual drives turn whole vectors in such a step
+  double step_s = 1e9;
+  for (std::uint32_t i = 0; i < scene.size(); ++i) {
+    double own_s = 0;
+    for (const Axis axis : kAxes)
+      own_s = std::max(own_s, kStepDeg * std::numbers::pi / 180 / scene.arm(i).step_rad(axis) *
+                                  SecondsPerVector(drives[i].axis[Index(axis)]));
+    step_s = std::min(step_s, own_s);
+  }
+  TimeSteps steps;
+  steps.ticks =
+      std::max<std::int64_t>(1, std::llround(step_s / kTickS / kRoundTicks)) * kRoundTicks;
+  // Longer steps make a coarser search; what is found is proven all the same.
+  constexpr double kStepsMost = 64 * kStepWordsMost - 3;
+  const double coarser = std::max(1.0, end_s / (kStepsMost * steps.step_s()));
+  steps.ticks = static_cast<std::int64_t>(std::ceil(coarser * static_cast<double>(steps.ticks)));
+  // A way may need a step more than its time: parts of vectors are left at the end of a step.
+  steps.count = static_cast<std::int32_t>(std::ceil(end_s / steps.step_s())) + 2;
+  return steps;
+}
 
 Occupancy::Occupancy(const Motions& motions, const TimeSteps& steps)
     : motions_(motions),

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "fleet/plan/motions.h"
@@ -26,6 +27,13 @@ struct TimeSteps {
   /// Words of 64 bits that hold one bit a step, and one more for the time after the last.
   [[nodiscard]] std::size_t words() const { return static_cast<std::size_t>(count) / 64 + 1; }
 };
+
+/// At most so many words hold one bit a step.
+inline constexpr std::size_t kStepWordsMost = 8;
+
+/// Steps in which the quickest unit turns by 6 degrees, until `end_s`. Where that is too many steps
+/// they are longer. Shape: `drives` (n).
+TimeSteps StepsUntil(const Scene& scene, std::span<const UnitDrive> drives, double end_s);
 
 /// A part of the raster of the plate. Cells are counted from the plate's origin.
 struct RasterWindow {

@@ -28,6 +28,8 @@ constexpr std::size_t kTightest = 20;  // pairs that Plan::tightest lists
 /// Repeats with other random numbers, without limits of power.
 constexpr std::uint64_t kFreshStarts = 3;
 constexpr double kLongGiven = 1.02;  // times the bound: given motions up to here do not lengthen it
+/// A plan that ends later than this, times the bound, is worth work on its end.
+constexpr double kWorthImproving = 1.2;
 constexpr double kNearBound = 1.03;  // times the bound
 /// Share of the time beyond which power takes the time, and rails are full.
 constexpr double kFullShare = 0.75;
@@ -72,6 +74,7 @@ class Planner {
   bool LetStepAside(std::uint32_t stuck);
   [[nodiscard]] Status CheckWanted() const;
   [[nodiscard]] double MeanNeighbours() const;
+  [[nodiscard]] LocalSearchResult Search(LocalSearchRequest search) const;
   bool AllAtOnce(std::span<const AxisPaths> begin_with);
   bool LeaveStuck();
   void PlanOfLocalSearch();
@@ -238,6 +241,23 @@ double Planner::MeanNeighbours() const {
   return scene_.size() == 0 ? 0 : static_cast<double>(sum) / static_cast<double>(scene_.size());
 }
 
+/// Dense plates are searched by neighbourhoods, and so are others where the plan ends late.
+LocalSearchResult Planner::Search(LocalSearchRequest search) const {
+  const DenseSearchOptions dense{.within = kDenseWithin, .improve_cpu_s = options_.improve_cpu_s};
+  if (dense_) return SearchDense(search, dense);
+  LocalSearchResult made = SearchLocally(search);
+  if (made.starved || !made.in_conflict.empty() || search.ledger != nullptr ||
+      !search.given.empty() || dense.improve_cpu_s <= 0)
+    return made;
+  double end_s = 0;
+  for (const Track& track : made.tracks)
+    if (!track.legs().empty()) end_s = std::max(end_s, track.end_s());
+  if (end_s <= kWorthImproving * search.within_s) return made;
+  search.begin_with = made.paths;
+  LocalSearchResult sooner = SearchDense(search, dense);
+  return sooner.in_conflict.empty() ? sooner : made;
+}
+
 /// Plans all units at once. False: some units still meet others, and nothing is planned.
 bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   std::vector<std::uint8_t> may_move(service_.movable().begin(), service_.movable().end());
@@ -276,10 +296,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
                                     .within_s = within_s,
                                     .seed = options_.seed + fresh_starts,
                                     .abandoned = options_.abandoned};
-    local_search_ =
-        dense_
-            ? SearchDense(search, {.within = kDenseWithin, .improve_cpu_s = options_.improve_cpu_s})
-            : SearchLocally(search);
+    local_search_ = Search(search);
     if (local_search_.starved) break;
     if (local_search_.in_conflict.empty()) {
       PlanOfLocalSearch();

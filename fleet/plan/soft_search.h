@@ -49,8 +49,6 @@ class StepPaths {
 
 class SoftSearch {
  public:
-  static constexpr std::size_t kWordsMax = 8;
-
   struct Question {
     const ArmGeometry* arm = nullptr;
     const UnitDrive* drive = nullptr;
