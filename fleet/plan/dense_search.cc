@@ -40,6 +40,15 @@ constexpr double kExpansionCost_s = 0.6e-6;
 constexpr double kReplanCost_s = 150e-6;
 constexpr double kJointStepCost_s = 0.8e-6;
 
+TimeSteps DenseStepsOf(const LocalSearchRequest& q) {
+  double end_s = kWithinMost * q.within_s;
+  for (std::uint32_t i = 0; i < q.scene->size() && !q.begin_with.empty(); ++i)
+    if (!IsEmpty(q.begin_with[i]) && q.scene->is_place(i))
+      end_s =
+          std::max(end_s, Track(q.scene->arm(i), q.drives[i], q.from[i], q.begin_with[i]).end_s());
+  return StepsUntil(*q.scene, q.drives, end_s);
+}
+
 class DenseSearch {
  public:
   DenseSearch(const LocalSearchRequest& request, const DenseSearchOptions& options)
@@ -48,7 +57,7 @@ class DenseSearch {
         scene_(*request.scene),
         rng_(Rng::Stream(request.seed, "dense")),
         motions_(request),
-        occupancy_(motions_, StepsOf(request)),
+        occupancy_(motions_, DenseStepsOf(request)),
         end_step_(std::min(occupancy_.steps().count - 1,
                            static_cast<std::int32_t>(std::ceil(options.within * request.within_s /
                                                                occupancy_.steps().step_s())) +
@@ -63,7 +72,6 @@ class DenseSearch {
     AxisPaths path;
   };
 
-  static TimeSteps StepsOf(const LocalSearchRequest& q);
   void Begin();
   bool MayPlan(std::uint32_t unit) const {
     return q_.movable[unit] != 0 && !motions_.IsGiven(unit) && scene_.is_place(unit);
@@ -81,9 +89,6 @@ class DenseSearch {
   }
   bool Choose(std::uint32_t unit);
   [[nodiscard]] bool IsChosen(std::uint32_t unit) const;
-  [[nodiscard]] bool AreNeighbours(std::uint32_t a, std::uint32_t b) const {
-    return motions_.SlotOf(a, b) < scene_.neighbours(a).size();
-  }
   void ChooseMet(std::size_t first, std::size_t last);
   void PutBack(std::span<const Before> before);
   void UpdateConflicts(std::uint32_t unit);
@@ -128,15 +133,6 @@ class DenseSearch {
   std::vector<MovingNeighbour> moving_;
   std::vector<std::uint8_t> rests_;
 };
-
-TimeSteps DenseSearch::StepsOf(const LocalSearchRequest& q) {
-  double end_s = kWithinMost * q.within_s;
-  for (std::uint32_t i = 0; i < q.scene->size() && !q.begin_with.empty(); ++i)
-    if (!IsEmpty(q.begin_with[i]) && q.scene->is_place(i))
-      end_s =
-          std::max(end_s, Track(q.scene->arm(i), q.drives[i], q.from[i], q.begin_with[i]).end_s());
-  return StepsUntil(*q.scene, q.drives, end_s);
-}
 
 double DenseSearch::End() const {
   double end_s = 0;
@@ -355,7 +351,8 @@ bool DenseSearch::Repair(const Pair& pair) {
     // Sometimes a third unit stands between the two.
     const auto near = scene_.neighbours(pair.first);
     const std::uint32_t third = near[rng_.Below(near.size())].unit;
-    if (rng_.Below(4) == 0 && AreNeighbours(third, pair.second)) planned += Choose(third) ? 1u : 0u;
+    if (rng_.Below(4) == 0 && motions_.SlotOf(third, pair.second) < scene_.neighbours(third).size())
+      planned += Choose(third) ? 1u : 0u;
     std::array<std::uint32_t, JointSearch::kMembersMax> units{};
     for (std::size_t n = 0; n < planned; ++n) units[n] = chosen_[n].unit;
     ok = ReplanTogether(std::span(units).first(planned));
