@@ -143,7 +143,9 @@ double DenseSearch::End() const {
 void DenseSearch::UpdateConflicts(std::uint32_t unit) {
   for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot) {
     const Pair pair = std::minmax(unit, scene_.neighbours(unit)[slot].unit);
-    if (motions_.Meets(unit, motions_.track(unit), slot))
+    // A unit may be without a way: limits of power, or nobody wants the plan any more.
+    const bool has_way = !motions_.track(unit).legs().empty();
+    if (has_way && motions_.Meets(unit, motions_.track(unit), slot))
       conflicts_.insert(pair);
     else
       conflicts_.erase(pair);
