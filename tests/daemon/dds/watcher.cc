@@ -47,8 +47,7 @@ int Main(int argc, char** argv) {
     samples += update.units.size();
     if (now - said < std::chrono::seconds(1)) continue;
     said = now;
-    std::printf("%zu %lu %ld\n", units.size(), static_cast<unsigned long>(samples),
-                static_cast<long>(longest.count()));
+    std::printf("%zu %lu %ld\n", units.size(), samples, longest.count());
     std::fflush(stdout);
   }
   return 0;
