@@ -123,8 +123,24 @@ class CsvParser {
     }
   }
 
+  [[nodiscard]] std::string_view NextLine() const {
+    const std::size_t end = text_.find('\n', at_);
+    if (end == std::string_view::npos) return {};
+    return text_.substr(end + 1, text_.find('\n', end + 1) - end - 1);
+  }
+  static std::size_t WordsIn(std::string_view line) {
+    std::size_t words = 0;
+    char before = ' ';
+    for (const char c : line) {
+      if (c != ' ' && c != '\r' && before == ' ') ++words;
+      before = c;
+    }
+    return words;
+  }
+
   /// Chooses what separates cells, by the header. Commas come first: a semicolon beside them is
-  /// part of a name.
+  /// part of a name. Blanks are the last: the next line must have as many words, or they are part
+  /// of the only column's name.
   void ChooseSeparator(std::string_view header) {
     bool in_quotes = false;
     bool any[256] = {};
@@ -133,7 +149,8 @@ class CsvParser {
       if (!in_quotes) any[static_cast<unsigned char>(c)] = true;
     }
     separator_ = any[','] ? ',' : any[';'] ? ';' : any['\t'] ? '\t' : ',';
-    by_blanks_ = !any[','] && !any[';'] && (is_ecsv_ || (!any['\t'] && any[' ']));
+    by_blanks_ = !any[','] && !any[';'] &&
+                 (is_ecsv_ || (!any['\t'] && any[' '] && WordsIn(header) == WordsIn(NextLine())));
     table_.decimal_comma_ = separator_ == ';';
   }
 
