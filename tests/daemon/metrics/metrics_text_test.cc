@@ -53,9 +53,12 @@ std::size_t SeriesOf(const std::string& page) {
 }
 
 TEST(MetricsText, HasAtMostAThousandSeriesForAnyPlate) {
-  for (const std::uint32_t buses : {200u, 201u, 512u})
-    EXPECT_LE(SeriesOf(PageOf({.units = 20'000, .buses = buses, .rails = buses / 5})), 1000u)
-        << buses;
+  for (const std::uint32_t buses : {200u, 201u, 512u}) {
+    const std::size_t series =
+        SeriesOf(PageOf({.units = 20'000, .buses = buses, .rails = buses / 5}));
+    EXPECT_LE(series, 1000u) << buses;
+    RecordProperty("series_" + std::to_string(buses), static_cast<int>(series));
+  }
 }
 
 TEST(MetricsText, BusesOfOneGroupAddUpAndShowTheWorst) {
@@ -82,6 +85,7 @@ TEST(MetricsText, EachOfFewBusesIsAGroup) {
 TEST(MetricsText, HasAtMostAThousandSeriesForFiftyBuses) {
   const std::size_t usual = SeriesOf(PageOf({.units = 5000, .buses = 50, .rails = 10}));
   EXPECT_LE(usual, 1000u);
+  RecordProperty("series", static_cast<int>(usual));  // docs/metrics.md
   // As many as the buses take, and hardly any: the number of units changes nothing.
   EXPECT_EQ(SeriesOf(PageOf({.units = 6400, .buses = 50, .rails = 10})), usual);
   EXPECT_EQ(SeriesOf(PageOf({.units = 50, .buses = 50, .rails = 10})), usual);
