@@ -28,13 +28,13 @@ namespace focalfleet {
 namespace {
 
 /// The door, its token, and how often it let somebody in.
-struct Door {
+struct FuzzedDoor {
   std::string folder;
   std::string secret;
   std::atomic<std::uint64_t> admitted{0};
   std::unique_ptr<HttpServer> server;
 
-  Door() {
+  FuzzedDoor() {
     std::string path = "/tmp/focalfleet_http_fuzz_XXXXXX";
     FOCALFLEET_CHECK(::mkdtemp(path.data()) != nullptr);
     folder = path;
@@ -64,7 +64,7 @@ struct Door {
         HttpServer::Options{.address = "127.0.0.1", .router = std::move(router), .limits = limits});
     while (server->port() == 0) ::usleep(1000);
   }
-  ~Door() {
+  ~FuzzedDoor() {
     server.reset();
     ::unlink((folder + "/tokens.csv").c_str());
     ::rmdir(folder.c_str());
@@ -96,7 +96,7 @@ std::string Ask(std::uint16_t port, const std::string& request) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace focalfleet;
-  static Door door;
+  static FuzzedDoor door;
   if (size == 0) return 0;
   const bool shows_token = data[0] % 2 == 1;
   const std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
