@@ -24,7 +24,7 @@ using test::PlanningFleet;
 using test::TestSeed;
 
 /// Returns the makespan over the time of the slowest unit alone.
-double ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
+double ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed, double unnoticed_most = 0.02) {
   FOCALFLEET_TRACE_SEED(seed);
   DrawStartAndTargets(fleet, seed);
   const std::clock_t begin = std::clock();
@@ -38,10 +38,10 @@ double ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
   for (const Unserved& unserved : plan->unserved)
     EXPECT_TRUE(unserved.proof) << "unit index " << unserved.unit.value;
   const double ratio = plan->makespan_s / plan->bound_s;
-  // In a plan all at once hardly any of the pairs that cross may be noticed too late; an order has
-  // no notice.
+  // In a plan all at once few of the pairs that cross may be noticed too late; an order has no
+  // notice.
   if (ratio < 1.25) {
-    EXPECT_LE(static_cast<double>(plan->unnoticed.size()), 0.02 * plan->crossings);
+    EXPECT_LE(static_cast<double>(plan->unnoticed.size()), unnoticed_most * plan->crossings);
   }
   ExpectSound(*fleet, *plan);
   std::printf("FOCALFLEET_SEED=%llu moves %zu unserved %zu makespan %.2f of %.2f s cpu %.2f s\n",
@@ -71,10 +71,14 @@ TEST_P(HexScale, Serves5000UnitsFromRandomToRandom) {
 INSTANTIATE_TEST_SUITE_P(Seeds, HexScale, ::testing::Range(0, 4));
 
 TEST(DenseScale, ServesPlatesLikeThoseOfSdss) {
+  // Arms that reach over their neighbours' bases stand in each other's way far more often.
+  constexpr double kUnnoticedMost = 0.2;
+  constexpr double kRatioMost = 1.8;
   PlanningFleet small = FleetOf(MakeHexLayout(SdssLike(500)));
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) ExpectAllServed(&small, TestSeed(seed));
+  for (std::uint64_t seed = 1; seed <= 6; ++seed)
+    EXPECT_LE(ExpectAllServed(&small, TestSeed(seed), kUnnoticedMost), kRatioMost);
   PlanningFleet large = FleetOf(MakeHexLayout(SdssLike(5000)));
-  ExpectAllServed(&large, TestSeed(7));
+  EXPECT_LE(ExpectAllServed(&large, TestSeed(7), kUnnoticedMost), kRatioMost);
 }
 
 #ifdef FOCALFLEET_DESI_UNITS
