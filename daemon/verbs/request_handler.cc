@@ -134,6 +134,8 @@ void RequestHandler::Do(const FleetView& view, const IncomingLine& line, const A
   if (const Status permitted = CheckRight(asked.caller, request->verb, request->args); !permitted) {
     if (permitted.error().code == ErrorCode::kRefused)
       NoteRefusal(view, line, asked, permitted.error());
+    else
+      options_.log(request->verb + " refused: " + FirstRow(permitted.error().text));
     return Answer(pending, tl::unexpected<Error>(permitted.error()));
   }
   if (request->verb == "access") return Answer(pending, AccessJson(asked.caller));

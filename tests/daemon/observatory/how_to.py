@@ -40,7 +40,7 @@ def rows(path):
 def commands():
     """The lines of the page's section that begin with four blanks and the program's name."""
     name = {"desi": "DESI", "sdss": "SDSS", "pfs": "PFS", "moons": "MOONS"}[PROJECT]
-    section = PAGE.split(f"## You run {name}-like robots")[1].split("\n## ")[0]
+    section = PAGE.split(f"## You run {name}-like robots")[1].split("\n## ")[0].replace("\\\n", " ")
     return [line.split()[1:] for line in section.splitlines() if line.startswith("    focalfleet ")]
 
 
