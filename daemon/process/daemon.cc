@@ -443,9 +443,10 @@ Status Daemon::End() {
                                                                     status_.thread.reset();
                                                                     status_.publisher.reset();
                                                                   }}});
+  // The reader's connection is closed before the writer's, which then leaves one file.
+  std::vector<std::string> left = ending_->Wait(kEndWithin);
   store_.reset();
   doors_.handler.reset();
-  std::vector<std::string> left = ending_->Wait(kEndWithin);
   for (std::string& part : status_.ending->Wait(kStatusEndWithin)) left.push_back(std::move(part));
   left_ = !left.empty();
   if (left_)
