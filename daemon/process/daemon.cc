@@ -422,8 +422,8 @@ Status Daemon::Run() {
 }
 
 /// The order of the end: nothing more goes to the buses, then the last rows are stored, then
-/// clients and readers learn of the end. At last the store is one file and free for the next
-/// daemon, and the socket is gone. Parts that may hang end meanwhile, or are left behind.
+/// clients learn of the end. The reader closes before the writer, so that the store is one file, free
+/// for the next daemon. Then the socket is gone. Parts that may hang end meanwhile, or are left.
 Status Daemon::End() {
   const SlowEnd slow_end(&service_.socket,
                          {.progress = [this] { return stored_.writer->committed_through(); }});
@@ -443,7 +443,6 @@ Status Daemon::End() {
                                                                     status_.thread.reset();
                                                                     status_.publisher.reset();
                                                                   }}});
-  // The reader's connection is closed before the writer's, which then leaves one file.
   std::vector<std::string> left = ending_->Wait(kEndWithin);
   store_.reset();
   doors_.handler.reset();
