@@ -422,8 +422,9 @@ Status Daemon::Run() {
 }
 
 /// The order of the end: nothing more goes to the buses, then the last rows are stored, then
-/// clients learn of the end. The reader closes before the writer, so that the store is one file, free
-/// for the next daemon. Then the socket is gone. Parts that may hang end meanwhile, or are left.
+/// clients learn of the end. The reader closes before the writer, so that the store is one file,
+/// free for the next daemon. Then the socket is gone. Parts that may hang end meanwhile, or are
+/// left.
 Status Daemon::End() {
   const SlowEnd slow_end(&service_.socket,
                          {.progress = [this] { return stored_.writer->committed_through(); }});
