@@ -422,9 +422,8 @@ Status Daemon::Run() {
 }
 
 /// The order of the end: nothing more goes to the buses, then the last rows are stored, then
-/// clients learn of the end. The reader closes before the writer, so that the store is one file,
-/// free for the next daemon. Then the socket is gone. Parts that may hang end meanwhile, or are
-/// left.
+/// clients learn of the end. The reader closes before the writer, which then leaves one file. Parts
+/// that may hang end meanwhile, or are left behind.
 Status Daemon::End() {
   const SlowEnd slow_end(&service_.socket,
                          {.progress = [this] { return stored_.writer->committed_through(); }});
