@@ -31,8 +31,7 @@ RenewingStatusPublisher::RenewingStatusPublisher(Options options)
 
 bool RenewingStatusPublisher::Publish(const StatusBatch& status) {
   if (options_.renews) Remember(status);
-  Turn();
-  if (next_ != nullptr) next_->Publish(status);
+  RenewIfAsked();
   const bool waits = current_->Publish(status);
   Count();
   return waits;
@@ -43,8 +42,7 @@ void RenewingStatusPublisher::Publish(const AlarmValue& alarm) {
     alarms_.push_back(alarm);
     if (alarms_.size() > StatusPublisher::kAlarmsKept) alarms_.pop_front();
   }
-  Turn();
-  if (next_ != nullptr) next_->Publish(alarm);
+  RenewIfAsked();
   current_->Publish(alarm);
   Count();
 }
@@ -57,34 +55,24 @@ void RenewingStatusPublisher::Remember(const StatusBatch& status) {
   if (status.configuration) rest_.configuration = status.configuration;
 }
 
-/// A renewal begins, or ends.
-void RenewingStatusPublisher::Turn() {
-  if (asked_.exchange(false)) {
-    // A renewal that is overtaken by another one had older credentials.
-    next_ = std::make_unique<BufferedStatusPublisher>(options_.join);
-    joined_at_.reset();
-    StatusBatch all = rest_;
-    all.units = units_.values;
-    all.orientations = orientations_.values;
-    all.buses = buses_.values;
-    next_->Publish(all);
-    for (const AlarmValue& alarm : alarms_) next_->Publish(alarm);
-  }
-  if (next_ == nullptr || !next_->joined()) return;
-  const auto now = options_.now();
-  if (!joined_at_) joined_at_ = now;
-  if (now - *joined_at_ < options_.overlap) return;
+void RenewingStatusPublisher::RenewIfAsked() {
+  if (!asked_.exchange(false)) return;
   earlier_samples_ += current_->samples();
   earlier_bytes_ += current_->bytes();
-  current_ = std::move(next_);
-  joined_at_.reset();
-  spdlog::info("DDS: the new participant has taken the place of the old one");
+  current_.reset();
+  current_ = std::make_unique<BufferedStatusPublisher>(options_.join);
+  StatusBatch all = rest_;
+  all.units = units_.values;
+  all.orientations = orientations_.values;
+  all.buses = buses_.values;
+  current_->Publish(all);
+  for (const AlarmValue& alarm : alarms_) current_->Publish(alarm);
+  spdlog::info("DDS: a new participant has taken the place of the old one");
 }
 
 void RenewingStatusPublisher::Count() {
-  const bool both = next_ != nullptr;
-  samples_ = earlier_samples_ + current_->samples() + (both ? next_->samples() : 0);
-  bytes_ = earlier_bytes_ + current_->bytes() + (both ? next_->bytes() : 0);
+  samples_ = earlier_samples_ + current_->samples();
+  bytes_ = earlier_bytes_ + current_->bytes();
 }
 
 }  // namespace focalfleet

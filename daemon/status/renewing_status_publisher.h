@@ -1,16 +1,15 @@
-// A publisher of status whose participant of DDS can be made anew without a gap, as new credentials
-// ask for. The new participant joins beside the old one and gets the whole state. Both publish
-// until readers have surely found the new one, then the old one leaves. A new one that cannot join
-// keeps trying, and the old one stays.
+// A publisher of status whose participant of DDS can be made anew, as new credentials ask for.
+// Cyclone DDS keeps one set of permissions for each domain and process: those of the first
+// participant, for as long as any participant is there. The old participant therefore leaves before
+// the new one joins. Readers miss some seconds, the time of a handshake, and then get the whole
+// state. Where the same process has another participant in the domain (a camera over DDS), the old
+// permissions stay in force until the process ends.
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <memory>
-#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -25,10 +24,6 @@ class RenewingStatusPublisher {
   struct Options {
     LateJoin<StatusPublisher>::Options join;  // used anew for each participant
     bool renews = false;                      // Renew may be called: the state is kept for that
-    /// Readers find a new participant within a second, on a busy host within some. A participant
-    /// that is lost is forgotten after 10 s.
-    std::chrono::milliseconds overlap{15'000};
-    std::function<std::chrono::steady_clock::time_point()> now = &std::chrono::steady_clock::now;
   };
   explicit RenewingStatusPublisher(Options options);
 
@@ -53,13 +48,11 @@ class RenewingStatusPublisher {
   };
 
   void Remember(const StatusBatch& status);
-  void Turn();
+  void RenewIfAsked();
   void Count();
 
   Options options_;
   std::unique_ptr<BufferedStatusPublisher> current_;
-  std::unique_ptr<BufferedStatusPublisher> next_;                   // none: no renewal is under way
-  std::optional<std::chrono::steady_clock::time_point> joined_at_;  // of next_
   Latest<UnitStatusValue> units_;
   Latest<UnitOrientationValue> orientations_;
   Latest<BusStatusValue> buses_;
