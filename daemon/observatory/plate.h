@@ -124,7 +124,7 @@ void LeaveOut(const NamedTable& table, std::size_t row, const std::string& unit,
 
 // ---- The folder
 
-/// Whoever stands outside its range cannot be planned: it is disabled, with that reason.
+/// A robot outside its range cannot be planned: it is disabled, with that reason.
 void DisableOutsiders(Plate* plate);
 
 /// Writes units.csv, origin.csv, state.csv, disabled.csv, obstacles.csv, left_out.csv, and those of

@@ -21,14 +21,14 @@ std::string TextOfValue(const Json& value) {
 }
 
 void PutMembers(const Json& object, const std::string& prefix, RowCollector* rows) {
-  constexpr std::size_t kElementsMax = 32;
+  constexpr std::size_t kJsonElementsMax = 32;
   constexpr std::ptrdiff_t kDepthMax = 8;
   if (std::ranges::count(prefix, '.') > kDepthMax) return;
   for (const auto& [key, value] : object.items()) {
     const std::string name = prefix + key;
     if (value.is_object()) {
       PutMembers(value, name + ".", rows);
-    } else if (value.is_array() && value.size() <= kElementsMax) {
+    } else if (value.is_array() && value.size() <= kJsonElementsMax) {
       for (std::size_t k = 0; k < value.size(); ++k)
         rows->Put(name + "_" + std::to_string(k), TextOfValue(value[k]));
     } else if (!value.is_array()) {

@@ -6,7 +6,7 @@
 // the next no axis gets farther than into a cell beside its own. At each look the two are clear of
 // each other, so their joint cell has a pose that is clear. A joint cell is closed if it has none:
 // the arms in its middle are nearer than the rule asks by more than both can travel within the
-// cell. Whoever needs K changes of cells on the shortest way through joint cells that are not
+// cell. A unit that needs K changes of cells on the shortest way through joint cells that are not
 // closed therefore needs at least K - 1 steps. No pose between the looks is asked for anything, so
 // the bound holds for every motion, at any speed up to the axes' own, with waits and turns.
 #pragma once

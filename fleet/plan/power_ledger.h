@@ -37,7 +37,7 @@ class PowerLedger {
   /// True: `path` would keep the limits if the unit left `instead_of`, which is entered.
   bool Fits(std::uint32_t unit, const AxisPaths& path, const AxisPaths& instead_of);
 
-  /// There is room for `power_W` more on the rail of the unit, whenever by its own clock within
+  /// Whether the rail of the unit has room for `power_W` more, whenever by its own clock within
   /// these times. Units: s.
   [[nodiscard]] bool HasRoom(std::uint32_t unit, double power_W, double from_s, double to_s) const;
 

@@ -70,7 +70,7 @@ class DdsSecurity : public ::testing::Test {
     return units;
   }
 
-  /// What a WATCHER has received, as it prints it once a second.
+  /// Received by a WATCHER, as it prints once a second.
   struct Line {
     std::size_t units = 0;
     std::uint64_t samples = 0;
