@@ -12,7 +12,7 @@
 namespace focalfleet::observatory {
 namespace {
 
-constexpr double kGear = 337.36;
+constexpr double kDesiGear = 337.36;
 constexpr double kPhiEndDeg = 185;  // of the hard stop that phi is counted from
 constexpr double kNominalArm_mm = 3;
 constexpr double kNominalThetaRangeDeg = 390;
@@ -111,7 +111,7 @@ std::vector<bool> Newest(const CsvTable& table, const std::string& name) {
   return newest;
 }
 
-Status TakeLayout(const NamedTable& source, const SourceFiles& files, Plate* plate) {
+Status TakeDesiLayout(const NamedTable& source, const SourceFiles& files, Plate* plate) {
   const CsvTable& table = source.table;
   const LayoutColumns columns(table);
   FOCALFLEET_TRY(table.Require({"length_r1", "length_r2", "offset_t", "offset_p"}));
@@ -132,7 +132,7 @@ Status TakeLayout(const NamedTable& source, const SourceFiles& files, Plate* pla
     const std::string reason = ReasonOf(&row);
     if (!reason.empty()) Disable(&unit, reason);
     TakeGeometry(columns, *petal, !reason.empty(), &row, &unit.unit);
-    SetGears(files, kGear, kGear, &unit.unit);
+    SetGears(files, kDesiGear, kDesiGear, &unit.unit);
     unit.unit.rail = RailId{*petal};
     constexpr std::uint32_t kBusesOfAPetal = 100;
     if (const auto bus = NumberInName(row.Text("bus_id")); bus && *bus < kBusesOfAPetal)
@@ -164,7 +164,7 @@ struct StateBit {
 };
 constexpr StateBit kStateBits[] = {{2, "stuck"}, {4, "fibre broken"}};
 
-Status TakeState(const std::vector<NamedTable>& tables, Plate* plate) {
+Status TakeDesiState(const std::vector<NamedTable>& tables, Plate* plate) {
   for (const NamedTable& each : tables) {
     const CsvTable& table = each.table;
     FOCALFLEET_TRY(table.Require({"pos_t", "pos_p"}));
@@ -189,7 +189,7 @@ Status TakeState(const std::vector<NamedTable>& tables, Plate* plate) {
   return {};
 }
 
-Status TakeTargets(const std::vector<NamedTable>& tables, Plate* plate) {
+Status TakeDesiTargets(const std::vector<NamedTable>& tables, Plate* plate) {
   FOCALFLEET_TRY_ASSIGN(const NamedTable* source,
                         Need(tables, {"fiberassign_x", "fiberassign_y"}, "targets"));
   const CsvTable& table = source->table;
@@ -348,16 +348,16 @@ Result<Plate> ReadDesi(const SourceFiles& files) {
   Plate plate;
   plate.parked = kParked;
   FOCALFLEET_TRY_ASSIGN(const auto layout, ReadAll(files.layout));
-  for (const NamedTable& each : layout) FOCALFLEET_TRY(TakeLayout(each, files, &plate));
+  for (const NamedTable& each : layout) FOCALFLEET_TRY(TakeDesiLayout(each, files, &plate));
   FOCALFLEET_TRY_ASSIGN(const auto disabled, ReadAll(files.disabled));
   FOCALFLEET_TRY(TakeDisabled(disabled, "pos_id", &plate));
   FOCALFLEET_TRY_ASSIGN(const auto state, ReadAll(files.state));
-  FOCALFLEET_TRY(TakeState(state, &plate));
+  FOCALFLEET_TRY(TakeDesiState(state, &plate));
   DisableOutsiders(&plate);
   FOCALFLEET_TRY(TakeFiducials(files, &plate));
   if (!files.targets.empty()) {
     FOCALFLEET_TRY_ASSIGN(const auto targets, ReadAll(files.targets));
-    FOCALFLEET_TRY(TakeTargets(targets, &plate));
+    FOCALFLEET_TRY(TakeDesiTargets(targets, &plate));
   }
   if (!files.moves.empty()) {
     FOCALFLEET_TRY_ASSIGN(const auto moves, ReadAll(files.moves));

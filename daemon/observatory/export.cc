@@ -236,7 +236,6 @@ PointFp PlaceOfFibre(const ExportRow& row, const FibreOfRobot& fibre, const Angl
     std::from_chars(text.data(), text.data() + text.size(), value);
     return value;
   };
-  constexpr double kDegPerRad = 57.295779513082320877;
   const double met_deg = std::atan2(number("metY"), number("metX")) * kDegPerRad;
   const double x = number(fibre.x);
   const double y = number(fibre.y);

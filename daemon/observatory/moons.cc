@@ -14,7 +14,7 @@ namespace focalfleet::observatory {
 namespace {
 
 constexpr double kRad = std::numbers::pi / 180;
-constexpr double kGear = 337.0 * 45 / 17;  // no key has it: that of the layouts made here
+constexpr double kMoonsGear = 337.0 * 45 / 17;  // no key has it: that of the layouts made here
 constexpr double kFoldedDeg = 180;
 
 PointFp PlaceOf(double r_mm, double theta_deg) {
@@ -22,11 +22,11 @@ PointFp PlaceOf(double r_mm, double theta_deg) {
 }
 
 /// A parameter file: keys with their values and lines.
-class Parameters {
+class MoonsParameters {
  public:
-  static Result<Parameters> Read(const std::string& path) {
+  static Result<MoonsParameters> Read(const std::string& path) {
     FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
-    Parameters parameters;
+    MoonsParameters parameters;
     parameters.file_ = path;
     std::string_view rest = text;
     for (int line = 1; !rest.empty(); ++line) {
@@ -107,13 +107,13 @@ class Parameters {
   std::unordered_map<std::string, Value> values_;
 };
 
-Result<PointFp> PlaceIn(const Parameters& parameters, const std::string& stem) {
+Result<PointFp> MoonsPlace(const MoonsParameters& parameters, const std::string& stem) {
   FOCALFLEET_TRY_ASSIGN(const double r_mm, parameters.Number(stem + ".RFOCAL"));
   FOCALFLEET_TRY_ASSIGN(const double theta_deg, parameters.Number(stem + ".THFOCAL"));
   return PlaceOf(r_mm, theta_deg);
 }
 
-Result<Unit> CommonUnit(const Parameters& parameters) {
+Result<Unit> CommonUnit(const MoonsParameters& parameters) {
   Unit unit;
   for (const Axis axis : kAxes) {
     const std::string number = axis == Axis::kTheta ? "1" : "2";
@@ -126,7 +126,7 @@ Result<Unit> CommonUnit(const Parameters& parameters) {
   return unit;
 }
 
-Status TakeUnit(const Parameters& parameters, std::uint32_t number, const Unit& common,
+Status TakeUnit(const MoonsParameters& parameters, std::uint32_t number, const Unit& common,
                 Plate* plate) {
   const std::string stem = "INS.POS" + std::to_string(number);
   const std::string fibre = "INS.FIBRE" + std::to_string(number);
@@ -134,7 +134,7 @@ Status TakeUnit(const Parameters& parameters, std::uint32_t number, const Unit& 
   unit.unit = common;
   unit.unit.id = UnitId{number};
   unit.name = "POS" + std::to_string(number);
-  FOCALFLEET_TRY_ASSIGN(unit.unit.base_fp, PlaceIn(parameters, stem));
+  FOCALFLEET_TRY_ASSIGN(unit.unit.base_fp, MoonsPlace(parameters, stem));
   if (parameters.Has(stem + ".ORIENT")) {
     FOCALFLEET_TRY_ASSIGN(unit.unit.axis[0].zero_deg, parameters.Number(stem + ".ORIENT"));
   }
@@ -149,7 +149,7 @@ Status TakeUnit(const Parameters& parameters, std::uint32_t number, const Unit& 
   };
   if (const std::string fault = FaultOf(unit.unit); !fault.empty()) return fail(fault);
   if (parameters.Has(fibre + ".RFOCAL")) {
-    FOCALFLEET_TRY_ASSIGN(const PointFp at, PlaceIn(parameters, fibre));
+    FOCALFLEET_TRY_ASSIGN(const PointFp at, MoonsPlace(parameters, fibre));
     unit.stands = AnglesAt(unit.unit, at);
     if (!unit.stands) return fail("its fibre cannot be where " + fibre + " has it");
   }
@@ -160,10 +160,10 @@ Status TakeUnit(const Parameters& parameters, std::uint32_t number, const Unit& 
 }
 
 /// Acquisition cameras stand among the positioners: circles of their field.
-Status TakeCameras(const Parameters& parameters, Plate* plate) {
+Status TakeCameras(const MoonsParameters& parameters, Plate* plate) {
   for (const std::uint32_t number : parameters.NumbersOf("ACQ", "RFOCAL")) {
     const std::string stem = "INS.ACQ" + std::to_string(number);
-    FOCALFLEET_TRY_ASSIGN(const PointFp at, PlaceIn(parameters, stem));
+    FOCALFLEET_TRY_ASSIGN(const PointFp at, MoonsPlace(parameters, stem));
     FOCALFLEET_TRY_ASSIGN(const double field_arcsec, parameters.Number(stem + ".FOV"));
     FOCALFLEET_TRY_ASSIGN(const double scale, parameters.Number("INS.POS.PSCALE"));
     if (scale <= 0)
@@ -173,10 +173,10 @@ Status TakeCameras(const Parameters& parameters, Plate* plate) {
   return {};
 }
 
-Status TakeLayout(const std::string& file, const SourceFiles& files, Plate* plate) {
-  FOCALFLEET_TRY_ASSIGN(const Parameters parameters, Parameters::Read(file));
+Status TakeMoonsLayout(const std::string& file, const SourceFiles& files, Plate* plate) {
+  FOCALFLEET_TRY_ASSIGN(const MoonsParameters parameters, MoonsParameters::Read(file));
   FOCALFLEET_TRY_ASSIGN(Unit common, CommonUnit(parameters));
-  SetGears(files, kGear, kGear, &common);
+  SetGears(files, kMoonsGear, kMoonsGear, &common);
   if (files.arm_half_width_mm == 0 && parameters.Has("INS.POS.WIDTH2")) {
     FOCALFLEET_TRY_ASSIGN(const double width_mm, parameters.Number("INS.POS.WIDTH2"));
     common.arm_half_width_mm = width_mm / 2;
@@ -238,7 +238,7 @@ Result<NamedTable> ReadTargetLines(const std::string& path, const Plate& plate) 
   return NamedTable{"", {}, std::move(table)};
 }
 
-Status TakeTargets(const std::string& file, Plate* plate) {
+Status TakeMoonsTargets(const std::string& file, Plate* plate) {
   FOCALFLEET_TRY_ASSIGN(const NamedTable source, ReadTargetLines(file, *plate));
   plate->targets = Targets{.source = file, .rows = {}};
   std::unordered_map<std::uint32_t, int> line_of;
@@ -284,12 +284,12 @@ Result<Plate> ReadMoons(const SourceFiles& files) {
                 "where each fibre stands");
   if (files.layout.size() != 1)
     return Fail(ErrorCode::kInvalid, "one configuration file is expected as the layout");
-  FOCALFLEET_TRY(TakeLayout(files.layout.front(), files, &plate));
+  FOCALFLEET_TRY(TakeMoonsLayout(files.layout.front(), files, &plate));
   FOCALFLEET_TRY_ASSIGN(const auto disabled, ReadAll(files.disabled));
   FOCALFLEET_TRY(TakeDisabled(disabled, "positioner", &plate));
   DisableOutsiders(&plate);
   FOCALFLEET_TRY(TakeFiducials(files, &plate));
-  for (const std::string& file : files.targets) FOCALFLEET_TRY(TakeTargets(file, &plate));
+  for (const std::string& file : files.targets) FOCALFLEET_TRY(TakeMoonsTargets(file, &plate));
   return plate;
 }
 

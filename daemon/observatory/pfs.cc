@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <unordered_map>
 #include <utility>
 
@@ -12,10 +11,9 @@
 namespace focalfleet::observatory {
 namespace {
 
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 constexpr std::int64_t kCobrasOfAModule = 57;
-constexpr double kGear = 337.0 * 45 / 17;  // a Cobra has none: that of the layouts made here
-constexpr double kLongestArm_mm = 10;      // an arm is 2.4 mm; longer ones are in pixels
+constexpr double kPfsGear = 337.0 * 45 / 17;  // a Cobra has none: that of the layouts made here
+constexpr double kLongestArm_mm = 10;         // an arm is 2.4 mm; longer ones are in pixels
 constexpr AnglesDeg kHome{0, 0};
 
 // Bits of Status; bit 0 alone: in order.
@@ -70,7 +68,7 @@ void TakeRanges(CsvRow* row, Unit* unit) {
   theta.max_deg = kTurn / 2 + way + kTurn / 2 - kTurn * std::floor((way + kTurn / 2) / kTurn);
 }
 
-Status TakeLayout(const NamedTable& source, const SourceFiles& files, Plate* plate) {
+Status TakePfsLayout(const NamedTable& source, const SourceFiles& files, Plate* plate) {
   FOCALFLEET_TRY(
       source.table.Require({"Module_Id", "Positioner_Id", "Global_base_pos_x", "Global_base_pos_y",
                             "Link1_Link_Length", "Link2_Link_Length", "CCW_Global_base_ori_z",
@@ -90,7 +88,7 @@ Status TakeLayout(const NamedTable& source, const SourceFiles& files, Plate* pla
     unit.unit.axis[0].zero_deg = row.Number("CCW_Global_base_ori_z");
     unit.unit.axis[1].zero_deg = stop - 180;
     TakeRanges(&row, &unit.unit);
-    SetGears(files, kGear, kGear, &unit.unit);
+    SetGears(files, kPfsGear, kPfsGear, &unit.unit);
     unit.unit.rail = RailId{static_cast<std::uint32_t>(module)};
     unit.unit.bus = BusId{static_cast<std::uint32_t>(module)};
     unit.ids["cobraId"] = std::to_string(unit.unit.id.value);
@@ -123,7 +121,7 @@ Status TakeFibreMap(const std::vector<NamedTable>& tables, Plate* plate) {
   return {};
 }
 
-Status TakeState(const std::vector<NamedTable>& tables, Plate* plate) {
+Status TakePfsState(const std::vector<NamedTable>& tables, Plate* plate) {
   for (const NamedTable& each : tables) {
     FOCALFLEET_TRY(each.table.Require({"cobra_id", "motor_target_theta", "motor_target_phi"}));
     FOCALFLEET_TRY(each.table.ReadRows([&](CsvRow& row) {
@@ -140,7 +138,7 @@ Status TakeState(const std::vector<NamedTable>& tables, Plate* plate) {
   return {};
 }
 
-Status TakeTargets(const std::vector<NamedTable>& tables, Plate* plate) {
+Status TakePfsTargets(const std::vector<NamedTable>& tables, Plate* plate) {
   FOCALFLEET_TRY_ASSIGN(const NamedTable* source,
                         Need(tables, {"fiberId", "pfiNominal_0", "pfiNominal_1"}, "targets"));
   const CsvTable& table = source->table;
@@ -306,18 +304,18 @@ Result<Plate> ReadPfs(const SourceFiles& files) {
   Plate plate;
   plate.parked = kHome;
   FOCALFLEET_TRY_ASSIGN(const auto layout, ReadAll(files.layout));
-  for (const NamedTable& each : layout) FOCALFLEET_TRY(TakeLayout(each, files, &plate));
+  for (const NamedTable& each : layout) FOCALFLEET_TRY(TakePfsLayout(each, files, &plate));
   FOCALFLEET_TRY_ASSIGN(const auto disabled, ReadAll(files.disabled));
   FOCALFLEET_TRY(TakeDisabled(disabled, "cobraId", &plate));
   FOCALFLEET_TRY_ASSIGN(const auto fibres, ReadAll(files.fibre_map));
   FOCALFLEET_TRY(TakeFibreMap(fibres, &plate));
   FOCALFLEET_TRY_ASSIGN(const auto state, ReadAll(files.state));
-  FOCALFLEET_TRY(TakeState(state, &plate));
+  FOCALFLEET_TRY(TakePfsState(state, &plate));
   DisableOutsiders(&plate);
   FOCALFLEET_TRY(TakeFiducials(files, &plate));
   if (!files.targets.empty()) {
     FOCALFLEET_TRY_ASSIGN(const auto targets, ReadAll(files.targets));
-    FOCALFLEET_TRY(TakeTargets(targets, &plate));
+    FOCALFLEET_TRY(TakePfsTargets(targets, &plate));
   }
   if (!files.moves.empty()) {
     FOCALFLEET_TRY_ASSIGN(const auto moves, ReadAll(files.moves));

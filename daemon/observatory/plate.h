@@ -6,6 +6,7 @@
 #pragma once
 
 #include <map>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -17,6 +18,8 @@
 #include "protocol/base/result.h"
 
 namespace focalfleet::observatory {
+
+inline constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 /// Angles of a unit's two axes, as this project counts them. Units: degrees.
 struct AnglesDeg {

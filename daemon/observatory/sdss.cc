@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <unordered_map>
 #include <utility>
 
@@ -12,8 +11,7 @@
 namespace focalfleet::observatory {
 namespace {
 
-constexpr double kDegPerRad = 180 / std::numbers::pi;
-constexpr double kGear = 337.0 * 45 / 17;  // no table has it: that of the layouts made here
+constexpr double kSdssGear = 337.0 * 45 / 17;  // no table has it: that of the layouts made here
 constexpr double kAlphaEndDeg = 360;
 constexpr double kBetaEndDeg = 180;
 constexpr double kNoValue = -999;
@@ -45,8 +43,8 @@ Result<Holes> ReadHoles(const NamedTable& source) {
   return holes;
 }
 
-Status TakeLayout(const NamedTable& source, const Holes& holes, const SourceFiles& files,
-                  Plate* plate) {
+Status TakeSdssLayout(const NamedTable& source, const Holes& holes, const SourceFiles& files,
+                      Plate* plate) {
   return source.table.ReadRows([&](CsvRow& row) {
     PlateUnit unit;
     unit.name = row.Text("positionerID");
@@ -69,7 +67,7 @@ Status TakeLayout(const NamedTable& source, const Holes& holes, const SourceFile
         .zero_deg = row.NumberIn("betaOffset", "deg") + std::atan2(met_y, met_x) * kDegPerRad,
         .min_deg = 0,
         .max_deg = kBetaEndDeg};
-    SetGears(files, kGear, kGear, &unit.unit);
+    SetGears(files, kSdssGear, kSdssGear, &unit.unit);
     unit.ids["holeID"] = row.Text("holeID");
     for (const char* column : kOffsets)
       if (row.Has(column)) unit.ids[column] = row.Text(column);
@@ -91,7 +89,7 @@ PlateUnit* UnitOfRow(const NamedTable& source, CsvRow* row, const std::string& c
   return unit;
 }
 
-Status TakeState(const std::vector<NamedTable>& tables, Plate* plate) {
+Status TakeSdssState(const std::vector<NamedTable>& tables, Plate* plate) {
   if (tables.empty()) return {};
   const NamedTable* source = WithColumns(tables, {"positionerID", "alphaReport", "betaReport"});
   const bool reported = source != nullptr;
@@ -117,7 +115,7 @@ struct RowsOfRobot {
   std::optional<std::size_t> assigned;
 };
 
-Status TakeTargets(const std::vector<NamedTable>& tables, Plate* plate) {
+Status TakeSdssTargets(const std::vector<NamedTable>& tables, Plate* plate) {
   FOCALFLEET_TRY_ASSIGN(const NamedTable* source,
                         Need(tables, {"positionerId", "alpha", "beta"}, "targets"));
   const CsvTable& table = source->table;
@@ -251,16 +249,16 @@ Result<Plate> ReadSdss(const SourceFiles& files) {
   FOCALFLEET_TRY_ASSIGN(const NamedTable* wok,
                         Need(layout, {"holeID", "xWok", "yWok", "ix", "iy"}, "the holes"));
   FOCALFLEET_TRY_ASSIGN(const Holes holes, ReadHoles(*wok));
-  FOCALFLEET_TRY(TakeLayout(*robots, holes, files, &plate));
+  FOCALFLEET_TRY(TakeSdssLayout(*robots, holes, files, &plate));
   FOCALFLEET_TRY_ASSIGN(const auto disabled, ReadAll(files.disabled));
   FOCALFLEET_TRY(TakeDisabled(disabled, "positionerID", &plate));
   FOCALFLEET_TRY_ASSIGN(const auto state, ReadAll(files.state));
-  FOCALFLEET_TRY(TakeState(state, &plate));
+  FOCALFLEET_TRY(TakeSdssState(state, &plate));
   DisableOutsiders(&plate);
   FOCALFLEET_TRY(TakeFiducials(files, &plate));
   if (!files.targets.empty()) {
     FOCALFLEET_TRY_ASSIGN(const auto targets, ReadAll(files.targets));
-    FOCALFLEET_TRY(TakeTargets(targets, &plate));
+    FOCALFLEET_TRY(TakeSdssTargets(targets, &plate));
   }
   FOCALFLEET_TRY(TakeMoves(files.moves, &plate));
   return plate;
