@@ -3,10 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
+#include "daemon/cli/table.h"
 #include "daemon/files/fits_table.h"
 #include "daemon/files/text_file.h"
 #include "fleet/files/csv.h"
@@ -18,6 +21,7 @@ namespace {
 struct MeasurementsOptions {
   std::uint64_t exposure = 0;  // 0: the newest of the last configuration
   std::string out = "-";
+  std::uint64_t worst = 0;  // 0: all, as a table for files
 };
 
 double NumberOrNan(const Json& row, const char* key) {
@@ -119,14 +123,55 @@ std::string CsvOf(const FitsTable& table) {
   return csv.Take();
 }
 
+/// Keeps rows of units with a target: those whose error is not known, then the farthest from it.
+void KeepWorst(std::size_t count, Json* rows) {
+  Json::array_t kept;
+  for (Json& row : *rows)
+    if (std::isfinite(NumberOrNan(row, "target_x_mm"))) kept.push_back(std::move(row));
+  const auto error_um = [](const Json& row) {
+    const double error = NumberOrNan(row, "error_um");
+    return row.value("moved_since", false) || std::isnan(error) ? HUGE_VAL : error;
+  };
+  std::ranges::stable_sort(kept,
+                           [&](const Json& a, const Json& b) { return error_um(a) > error_um(b); });
+  if (kept.size() > count) kept.resize(count);
+  *rows = std::move(kept);
+}
+
+std::string WorstAsText(const Json& answer) {
+  std::vector<std::vector<std::string>> rows = {{"unit", "error", "from target", "status"}};
+  for (const Json& row : ListIn(answer, "measurements")) {
+    const double error_um = NumberOrNan(row, "error_um");
+    const bool moved_since = row.value("moved_since", false);
+    const bool known = std::isfinite(error_um) && !moved_since;
+    const auto off_um = [&](const char* at, const char* target) {
+      return 1000 * (NumberIn(row, at) - NumberIn(row, target));
+    };
+    rows.push_back({std::to_string(CountIn(row, "unit_id")),
+                    known ? fmt::format("{:.1f} um", error_um) : "unknown",
+                    known ? fmt::format("{:+.1f}, {:+.1f} um", off_um("x_mm", "target_x_mm"),
+                                        off_um("y_mm", "target_y_mm"))
+                          : "",
+                    moved_since ? kMovedSince : TextIn(row, "status")});
+  }
+  if (rows.size() == 1) return "no unit has a target";
+  return AlignColumns(std::move(rows));
+}
+
 ExitCode RunMeasurements(const Context& context, const MeasurementsOptions& options) {
   Json args = Json::object();
   if (options.exposure != 0) args["exposure"] = options.exposure;
-  const auto answer = Ask(context, {.verb = "measurements", .args = args});
+  auto answer = Ask(context, {.verb = "measurements", .args = args});
   if (!answer) return Report(context, answer.error());
+  if (options.worst > 0 && answer->contains("measurements"))
+    KeepWorst(options.worst, &(*answer)["measurements"]);
   if (context.json) {
     PrintJson(*answer);
     if (options.out == "-") return ExitCode::kOk;
+  }
+  if (options.worst > 0 && options.out == "-") {
+    std::puts(WorstAsText(*answer).c_str());
+    return ExitCode::kOk;
   }
   const FitsTable table = TableOf(*answer);
   const Status written = options.out.ends_with(".fits")
@@ -144,6 +189,7 @@ ExitCode RunMeasurements(const Context& context, const MeasurementsOptions& opti
 void AddMeasurementsCommand(CommandLine* line) {
   CLI::App* command =
       AddCommand(&line->app, "measurements", "What was found of each unit in one exposure",
+                 "  focalfleet measurements --worst 10\n"
                  "  focalfleet measurements --out fibres.fits\n"
                  "  focalfleet measurements --exposure 12 --json");
   auto options = std::make_shared<MeasurementsOptions>();
@@ -153,6 +199,12 @@ void AddMeasurementsCommand(CommandLine* line) {
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{INT64_MAX}));
   AddFile(command, "--out", &options->out, "File to write: .fits, or else CSV; - is stdout")
       ->capture_default_str();
+  command
+      ->add_option(
+          "--worst", options->worst,
+          "Only the N units farthest from their targets, those with an unknown error first")
+      ->option_text("N")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000}));
   OnChosen(line, command, options, RunMeasurements);
 }
 

@@ -56,6 +56,39 @@ TEST_F(DaemonCommands, AlarmsOfOneNameAreOneLineWithTheirUnits) {
   EXPECT_THAT(Ask({"alarms"}, {{"alarms", {}}}).out, HasSubstr("no open alarms"));
 }
 
+TEST_F(DaemonCommands, TheWorstUnitsOfAnExposureComeFirst) {
+  const auto row = [](int unit, const Json& x_mm, const Json& error_um, const Json& target_x_mm,
+                      const char* status, bool moved_since = false) {
+    return Json{{"unit_id", unit},
+                {"status", status},
+                {"moved_since", moved_since},
+                {"x_mm", x_mm},
+                {"y_mm", 2},
+                {"error_um", error_um},
+                {"target_x_mm", target_x_mm},
+                {"target_y_mm", 2}};
+  };
+  const Json answer{{"exposure", 4},
+                    {"measurements",
+                     {row(1, 1.002, 2, 1, "ok"), row(2, 0.95, 50, 1, "ok"),
+                      row(3, nullptr, nullptr, 1, "missing"), row(4, 1.5, nullptr, nullptr, "ok"),
+                      row(5, 1.9, 900, 1, "ok", true), row(6, 1.01, 10, 1, "ok")}}};
+  const auto text = Ask({"measurements", "--worst", "4"}, {{"measurements", {.result = answer}}});
+  EXPECT_EQ(text.exit, 0) << told.err;
+  EXPECT_EQ(text.out,
+            "unit  error    from target     status\n"
+            "3     unknown                  missing\n"
+            "5     unknown                  moved_since\n"
+            "2     50.0 um  -50.0, +0.0 um  ok\n"
+            "6     10.0 um  +10.0, +0.0 um  ok\n");
+  const auto json =
+      Ask({"measurements", "--worst", "1", "--json"}, {{"measurements", {.result = answer}}});
+  ASSERT_EQ(json.exit, 0) << json.err;
+  const Json kept = Json::parse(json.out)["measurements"];
+  ASSERT_EQ(kept.size(), 1u);
+  EXPECT_EQ(kept[0]["unit_id"], 3);
+}
+
 TEST_F(DaemonCommands, AlarmsAreAcknowledgedByIdAndName) {
   const auto done = Ask({"alarms", "ack", "4711", "UnitNeverBegan"},
                         {{"alarms_ack", {.result = Json{{"text", "acknowledged 3"}}}}});
