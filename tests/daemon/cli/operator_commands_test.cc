@@ -74,7 +74,7 @@ TEST_F(DaemonCommands, TheWorstUnitsOfAnExposureComeFirst) {
                       row(3, nullptr, nullptr, 1, "missing"), row(4, 1.5, nullptr, nullptr, "ok"),
                       row(5, 1.9, 900, 1, "ok", true), row(6, 1.01, 10, 1, "ok")}}};
   const auto text = Ask({"measurements", "--worst", "4"}, {{"measurements", {.result = answer}}});
-  EXPECT_EQ(text.exit, 0) << told.err;
+  EXPECT_EQ(text.exit, 0) << text.err;
   EXPECT_EQ(text.out,
             "unit  error    from target     status\n"
             "3     unknown                  missing\n"
