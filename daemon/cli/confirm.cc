@@ -7,9 +7,7 @@
 namespace focalfleet::cli {
 
 std::optional<Failure> Refused(const std::string& what, bool yes) {
-  if (yes) return std::nullopt;
-  if (::isatty(STDIN_FILENO) == 0)
-    return Failure{ExitCode::kRefused, {ErrorCode::kRefused, what + "; add --yes"}};
+  if (yes || ::isatty(STDIN_FILENO) == 0) return std::nullopt;
   Complain("focalfleet: " + what + ". Go on? [y/N] ");
   std::string answer;
   std::getline(std::cin, answer);

@@ -1,5 +1,5 @@
 // The question before what cannot be taken back, or concerns many units at once. A person at a
-// terminal answers it; a script says --yes beforehand.
+// terminal answers it, or gives --yes beforehand. A script is never asked.
 #pragma once
 
 #include <optional>
@@ -13,8 +13,8 @@ namespace focalfleet::cli {
 /// named one by one, more are chosen by a range or a bus that may be a slip.
 inline constexpr std::size_t kUnitsUnasked = 10;
 
-/// None: go on. Otherwise the command ends with this refusal: a terminal said no, or there is no
-/// terminal to ask and the text says to add --yes. `what` is a sentence of what will happen.
+/// None: go on. Otherwise the command ends with this refusal, as somebody at the terminal said no.
+/// `what` is a sentence of what will happen.
 std::optional<Failure> Refused(const std::string& what, bool yes);
 
 }  // namespace focalfleet::cli

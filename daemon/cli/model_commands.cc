@@ -141,7 +141,7 @@ void AddModelCommands(CommandLine* line) {
                  "  focalfleet model load night-12-report/model.toml --yes");
   auto options = std::make_shared<LoadOptions>();
   AddFile(load, "FILE", &options->file, "model.toml")->required();
-  load->add_flag("--yes", options->yes, "Do not ask; needed where standard input is no terminal");
+  load->add_flag("--yes", options->yes, "Do not ask on a terminal");
   OnChosen(line, load, options, RunLoad);
   CLI::App* show =
       AddCommand(model, "show", "What holds, how well it is known, and what held before",

@@ -39,7 +39,7 @@ ExitCode PrintAnswer(const Context& context, const tl::expected<Json, Failure>& 
 }
 
 void AddYes(CLI::App* command, bool* yes) {
-  command->add_flag("--yes", *yes, "Do not ask; needed where standard input is no terminal");
+  command->add_flag("--yes", *yes, "Do not ask on a terminal");
 }
 
 // ---- home

@@ -68,6 +68,15 @@ ProgramResult DaemonCommands::Ask(std::vector<std::string> words,
   return result;
 }
 
+ProgramResult DaemonCommands::AskAtTerminal(const std::string& line, std::vector<std::string> words,
+                                            std::map<std::string, FakeAnswer> answers) {
+  FakeDaemon daemon(scratch_ / "sock", std::move(answers));
+  words.insert(words.end(), {"--socket", daemon.path()});
+  ProgramResult result = FocalfleetAtTerminal(line, words);
+  requests_ = daemon.requests();
+  return result;
+}
+
 ProgramResult DaemonCommands::Apply(const std::vector<std::string>& more, FakeAnswer answer) {
   std::vector<std::string> words = {"apply", scratch_.Put("t.csv", kTargets)};
   words.insert(words.end(), more.begin(), more.end());

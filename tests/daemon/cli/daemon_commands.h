@@ -29,6 +29,9 @@ class DaemonCommands : public ::testing::Test {
  protected:
   /// Runs `words` against a daemon with these answers; requests_ holds what the daemon was asked.
   ProgramResult Ask(std::vector<std::string> words, std::map<std::string, FakeAnswer> answers);
+  /// The same at a terminal, where `line` is typed.
+  ProgramResult AskAtTerminal(const std::string& line, std::vector<std::string> words,
+                              std::map<std::string, FakeAnswer> answers);
   /// Runs `apply` with kTargets and the options `more`.
   ProgramResult Apply(const std::vector<std::string>& more, FakeAnswer answer);
 

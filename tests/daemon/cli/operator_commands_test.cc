@@ -226,26 +226,35 @@ TEST_F(DaemonCommands, UnitsAreNamedByRangeBusAndState) {
   EXPECT_EQ(Ask({"disable", "--reason", "x"}, {{"disable", {}}}).exit, 2) << "no unit";
 }
 
-TEST_F(DaemonCommands, WhatCannotBeTakenBackIsRefusedWithoutATerminal) {
+TEST_F(DaemonCommands, WhatCannotBeTakenBackIsAskedAtATerminalAlone) {
   const std::string model = scratch_.Put("m.toml", "x");
+  const std::map<std::string, test::FakeAnswer> answers = {{"home", {}},    {"adopt", {}},
+                                                           {"disable", {}}, {"params_set", {}},
+                                                           {"model", {}},   {"model_load", {}}};
   for (std::vector<std::string> words :
        std::vector<std::vector<std::string>>{{"home", "7", "--unproven"},
                                              {"adopt", "7"},
                                              {"disable", "1-11", "--reason", "x"},
                                              {"params", "1-11", "set", "theta", "repeat", "54"},
                                              {"model", "load", model}}) {
-    const std::map<std::string, test::FakeAnswer> answers = {{"home", {}},    {"adopt", {}},
-                                                             {"disable", {}}, {"params_set", {}},
-                                                             {"model", {}},   {"model_load", {}}};
-    const auto refused = Ask(words, answers);
-    EXPECT_EQ(refused.exit, 1) << words[0];
-    EXPECT_THAT(refused.err, HasSubstr("add --yes")) << words[0];
+    const auto refused = AskAtTerminal("n", words, answers);
+    EXPECT_EQ(refused.exit, 1) << words[0] << refused.out;
+    EXPECT_THAT(refused.out, HasSubstr("Go on? [y/N]")) << words[0];
+    EXPECT_THAT(refused.out, HasSubstr("nothing was done")) << words[0];
     EXPECT_TRUE(requests_.empty()) << words[0];
+    EXPECT_EQ(AskAtTerminal("y", words, answers).exit, 0) << words[0];
+    EXPECT_FALSE(requests_.empty()) << words[0];
+    const auto script = Ask(words, answers);
+    EXPECT_EQ(script.exit, 0) << words[0] << script.err;
+    EXPECT_THAT(script.err, Not(HasSubstr("Go on?"))) << words[0];
     words.emplace_back("--yes");
-    EXPECT_EQ(Ask(words, answers).exit, 0) << words[0];
+    EXPECT_THAT(AskAtTerminal("n", words, answers).out, Not(HasSubstr("Go on?"))) << words[0];
+    EXPECT_FALSE(requests_.empty()) << words[0];
   }
-  EXPECT_EQ(Ask({"disable", "1-10", "--reason", "x"}, {{"disable", {}}}).exit, 0) << "a few";
-  EXPECT_EQ(Ask({"params", "1-10", "set", "theta", "repeat", "54"}, {{"params_set", {}}}).exit, 0);
+  const auto few = AskAtTerminal("n", {"disable", "1-10", "--reason", "x"}, answers);
+  EXPECT_EQ(few.exit, 0) << few.out;
+  EXPECT_EQ(AskAtTerminal("n", {"params", "1-10", "set", "theta", "repeat", "54"}, answers).exit,
+            0);
   EXPECT_EQ(Ask({"params", "1-11"}, {{"params", {}}}).exit, 0) << "nothing is set";
 }
 

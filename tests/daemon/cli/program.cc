@@ -97,6 +97,14 @@ ProgramResult FocalfleetInto(const std::string& redirection, std::vector<std::st
   return RunProgram(arguments);
 }
 
+ProgramResult FocalfleetAtTerminal(const std::string& line,
+                                   const std::vector<std::string>& arguments) {
+  std::string command = FOCALFLEET_PROGRAM;
+  for (const std::string& each : arguments) command += " " + each;
+  return RunProgram(
+      {"sh", "-c", R"(printf '%s\n' "$0" | script -qec "$1" /dev/null)", line, command});
+}
+
 std::string Slurp(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};

@@ -25,6 +25,11 @@ ProgramResult Focalfleet(std::vector<std::string> arguments);
 /// redirect other streams, too.
 ProgramResult FocalfleetInto(const std::string& redirection, std::vector<std::string> arguments);
 
+/// Runs focalfleet at a terminal of its own, where somebody types `line`. `out` is all that the
+/// terminal showed. Pre: the arguments need no quotes in a shell.
+ProgramResult FocalfleetAtTerminal(const std::string& line,
+                                   const std::vector<std::string>& arguments);
+
 std::string Slurp(const std::string& path);
 
 }  // namespace focalfleet::test
