@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/chances.h"
@@ -56,29 +57,58 @@ std::vector<UnitOffset> Offsets(const Fit& fit) {
   return offsets;
 }
 
-// A common offset of all bases belongs to the image, where the image moves: no table has its mean
-// place.
-void TakeOffTheImage(const Fit& fit, std::vector<UnitOffset>* offsets) {
-  constexpr std::size_t kUnitsMin = 6;
-  if (fit.model.exposures.empty() || offsets->size() < kUnitsMin) return;
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Identity() * 1e-12;
-  Eigen::Vector4d right = Eigen::Vector4d::Zero();
-  const auto columns = [&](const UnitOffset& one) {
-    const CampaignUnit& unit = fit.facts->campaign->units[one.unit];
-    const double x = unit.base_x_mm / fit.facts->radius_mm;
-    const double y = unit.base_y_mm / fit.facts->radius_mm;
-    Eigen::Matrix<double, 2, 4> j;
-    j << 1, 0, -y, x, 0, 1, x, y;
-    return j;
-  };
-  for (const UnitOffset& one : *offsets) {
-    const auto j = columns(one);
-    const double weight = 2 / one.covariance.topLeftCorner<2, 2>().trace();
-    normal += weight * j.transpose() * j;
-    right += weight * j.transpose() * one.offset.head<2>();
+// A unit's rows: the places that its offset moves in each, um, and the lever of the image's turn
+// and scale.
+struct OffsetRows {
+  WhiteUnit white;
+  VectorXd moved_um;  // interleaved x, y of the used rows
+  [[nodiscard]] std::size_t ExposureOf(const Fit& fit, std::size_t k) const {
+    return fit.facts->exposures.of_row[white.track.first_row + white.moves[k]];
   }
-  const Eigen::Vector4d common = normal.ldlt().solve(right);
-  for (UnitOffset& one : *offsets) one.offset.head<2>() -= columns(one) * common;
+  // Displacements by a shift, a turn and a scale of the image, where the row is.
+  [[nodiscard]] Eigen::Matrix<double, 2, 4> ImageAt(const Fit& fit, std::size_t k) const {
+    const std::size_t row = white.track.first_row + white.moves[k];
+    const double x = fit.facts->campaign->x_mm[row] / fit.facts->radius_mm;
+    const double y = fit.facts->campaign->y_mm[row] / fit.facts->radius_mm;
+    Eigen::Matrix<double, 2, 4> image;
+    image << 1, 0, -y, x, 0, 1, x, y;
+    return image;
+  }
+};
+
+// Where the image moves, what the offsets of all units do alike in an exposure is the image's
+// motion as well: no table has its place. Offsets are judged without it, as if by the marginal
+// likelihood of both, in which the motions of exposures do not depend on one another.
+void TakeOffTheImage(const Fit& fit, std::vector<UnitOffset>* offsets) {
+  if (fit.model.exposures.empty()) return;
+  constexpr double kUndetermined = 1e-9;  // keeps the equations of few rows determined
+  const std::size_t exposures = fit.facts->exposures.size();
+  std::vector<Eigen::Matrix4d> normal(exposures, Eigen::Matrix4d::Identity() * kUndetermined);
+  std::vector<Eigen::Vector4d> right(exposures, Eigen::Vector4d::Zero());
+  std::vector<OffsetRows> units;
+  for (const UnitOffset& one : *offsets) {
+    OffsetRows rows{Whiten(fit, one.unit), {}};
+    rows.moved_um = GeometryDisplacements(rows.white) * one.offset;
+    for (std::size_t k = 0; k < rows.white.moves.size(); ++k) {
+      const std::size_t e = rows.ExposureOf(fit, k);
+      const auto image = rows.ImageAt(fit, k);
+      const double weight = fit.weight[rows.white.track.first_row + rows.white.moves[k]];
+      normal[e] += weight * image.transpose() * image;
+      right[e] += weight * image.transpose() * rows.moved_um.segment<2>(static_cast<Index>(2 * k));
+    }
+    units.push_back(std::move(rows));
+  }
+  for (std::size_t e = 0; e < exposures; ++e) right[e] = normal[e].ldlt().solve(right[e]).eval();
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    const OffsetRows& rows = units[u];
+    VectorXd image_um(rows.moved_um.size());
+    for (std::size_t k = 0; k < rows.white.moves.size(); ++k)
+      image_um.segment<2>(static_cast<Index>(2 * k)) =
+          rows.ImageAt(fit, k) * right[rows.ExposureOf(fit, k)];
+    rows.white.Apply(image_um.data());
+    UnitOffset& one = (*offsets)[u];
+    one.offset -= one.covariance * (rows.white.geometry.transpose() * image_um);
+  }
 }
 
 // Chi-square that is left when only the parameters outside `rest` may differ.

@@ -337,9 +337,10 @@ std::vector<double> LengthsOf(const std::vector<const WhiteRow*>& rows) {
 // of false spots, whose rows are outliers. Half and twice of it: the same.
 constexpr double kExposureFactorMost = 10;
 
-// Factors are about 1; their common part is the fleet's noise. A unit or an exposure without any
-// residual has a factor, too: the least that numbers allow. Half or twice of it decides nothing, as
-// a place's noise has a floor of its own (rest_filter.h).
+// Factors are about 1. The common part of the units' factors, which know what the fits of the units
+// have absorbed, is the fleet's noise; exposures have none in common. A unit or an exposure without
+// any residual has a factor, too: the least that numbers allow. Half or twice of it decides
+// nothing, as a place's noise has a floor of its own (rest_filter.h).
 void Normalise(Noise* noise) {
   constexpr double kFactorLeast = 0.01;
   for (std::vector<double>* factors : {&noise->unit_factor, &noise->exposure_factor})
@@ -348,7 +349,6 @@ void Normalise(Noise* noise) {
     const double usual = Median(noise->exposure_factor);
     for (double& factor : noise->exposure_factor)
       factor = std::clamp(factor / usual, 1 / kExposureFactorMost, kExposureFactorMost);
-    noise->place_um *= usual;
   }
   const double usual = Median(noise->unit_factor);
   for (double& factor : noise->unit_factor) factor /= usual;
@@ -391,6 +391,20 @@ std::vector<double> DrawTogether(const std::vector<LogVariance>& estimates) {
   return drawn;
 }
 
+// The degrees of freedom of each unit's rows that the image's motion in their exposures has
+// absorbed.
+std::vector<double> AbsorbedByTheImage(const Fit& fit, const std::vector<UnitLengths>& units) {
+  constexpr double kOfExposure = 4;  // a shift, a turn and a scale
+  std::vector<double> absorbed(units.size(), 0);
+  if (fit.model.exposures.empty()) return absorbed;
+  std::vector<double> seen(fit.facts->exposures.size(), 0);
+  for (const UnitLengths& unit : units)
+    for (const WhiteRow& row : unit.rows) seen[row.exposure] += 1;
+  for (std::size_t unit = 0; unit < units.size(); ++unit)
+    for (const WhiteRow& row : units[unit].rows) absorbed[unit] += kOfExposure / seen[row.exposure];
+  return absorbed;
+}
+
 // The variance of the camera's noise in an exposure, by its present factor.
 LogVariance ExposureVariance(const std::vector<const WhiteRow*>& rows, double factor) {
   constexpr double kLeast = 0.05;      // of the present variance: less is not resolved in one step
@@ -399,10 +413,12 @@ LogVariance ExposureVariance(const std::vector<const WhiteRow*>& rows, double fa
   const auto n = static_cast<double>(rows.size());
   double share = 0;
   for (const WhiteRow* row : rows) share += row->camera_share / n;
-  // Squares grow by the camera's share of them.
-  const double excess = (Median(LengthsOf(rows)) / kMedianSquare - 1) / share;
-  return {2 * std::log(factor) + std::log(std::max(1 + excess, kLeast)),
-          kMedianError / (n * share * share)};
+  // Squares grow by the camera's share of them. Their median is known to a part of itself, which is
+  // a larger part of the camera's variance, and of a small one many times of it.
+  const double whole = Median(LengthsOf(rows)) / kMedianSquare;
+  const double of_camera = std::max(1 + (whole - 1) / share, kLeast);
+  const double error = whole / (share * of_camera);
+  return {2 * std::log(factor) + std::log(of_camera), kMedianError / n * error * error};
 }
 
 void FitFactors(Fit* fit) {
@@ -427,10 +443,11 @@ void FitFactors(Fit* fit) {
       }
     }
   });
+  const std::vector<double> absorbed = AbsorbedByTheImage(*fit, lengths);
   std::vector<LogVariance> of_unit(units);
   for (std::size_t unit = 0; unit < units; ++unit) {
     const double n = 2.0 * static_cast<double>(lengths[unit].square.size());
-    const double left = n - static_cast<double>(OwnColumns(*fit, unit));
+    const double left = n - static_cast<double>(OwnColumns(*fit, unit)) - absorbed[unit];
     if (left < 4) continue;
     const double own = Median(lengths[unit].square) / kMedianSquare * n / left;
     of_unit[unit] = {2 * std::log(fit->noise.unit_factor[unit]) + std::log(std::max(own, 1e-6)),
