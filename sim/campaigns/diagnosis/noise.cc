@@ -391,13 +391,11 @@ std::vector<double> DrawTogether(const std::vector<LogVariance>& estimates) {
   return drawn;
 }
 
-// The degrees of freedom of each unit's rows that the image's motion in their exposures has
-// absorbed.
+// Degrees of freedom of each unit that the image's motion in its exposures has absorbed.
 std::vector<double> AbsorbedByTheImage(const Fit& fit, const std::vector<UnitLengths>& units) {
   constexpr double kOfExposure = 4;  // a shift, a turn and a scale
-  std::vector<double> absorbed(units.size(), 0);
+  std::vector<double> absorbed(units.size(), 0), seen(fit.facts->exposures.size(), 0);
   if (fit.model.exposures.empty()) return absorbed;
-  std::vector<double> seen(fit.facts->exposures.size(), 0);
   for (const UnitLengths& unit : units)
     for (const WhiteRow& row : unit.rows) seen[row.exposure] += 1;
   for (std::size_t unit = 0; unit < units.size(); ++unit)
@@ -413,8 +411,8 @@ LogVariance ExposureVariance(const std::vector<const WhiteRow*>& rows, double fa
   const auto n = static_cast<double>(rows.size());
   double share = 0;
   for (const WhiteRow* row : rows) share += row->camera_share / n;
-  // Squares grow by the camera's share of them. Their median is known to a part of itself, which is
-  // a larger part of the camera's variance, and of a small one many times of it.
+  // Squares grow by the camera's share of them. Their median is known to a part of itself, which
+  // may be many times of a small variance of the camera.
   const double whole = Median(LengthsOf(rows)) / kMedianSquare;
   const double of_camera = std::max(1 + (whole - 1) / share, kLeast);
   const double error = whole / (share * of_camera);

@@ -1,5 +1,5 @@
 // Where each unit was seen after few moves, the fits of the units absorb much of the noise, and an
-// exposure shows few units. What is left must not look like causes.
+// exposure shows few units. The rest of the noise must not look like causes.
 #include <gmock/gmock.h>
 
 #include <cmath>
