@@ -209,6 +209,7 @@ std::unique_ptr<CommandLine> MakeCommandLine(AddStudy add_study) {
   AddModelCommands(line.get());
   AddStoreCommands(line.get());
   AddAccessCommands(line.get());
+  AddPageCommand(line.get());
   AddCanCommands(line.get());
   AddDoctorCommand(line.get());
   AddCompletionCommand(line.get());
