@@ -39,7 +39,7 @@ const std::vector<Group>& Groups() {
        {"status", "doctor", "unit", "state", "alarms", "events", "history", "watch",
         "measurements"}},
       {"Maintain units", {"disable", "enable", "adopt", "params"}},
-      {"Access", {"access", "audit", "token"}},
+      {"Access", {"access", "audit", "token", "page"}},
       {"Study and tune",
        {"campaign", "diagnose", "model", "simulate", "tune", "reproduce", "hall"}},
   };

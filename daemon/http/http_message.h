@@ -22,9 +22,9 @@ struct HttpRequest {
   std::string authorization;
   std::string content_type;
   std::string content_encoding;
-  std::string address;  // of the peer
+  std::string address;     // of the peer
   bool forwarded = false;  // a proxy names somebody else as the sender
-  std::string body;     // empty until the request was admitted
+  std::string body;        // empty until the request was admitted
 };
 
 /// The next bytes of an answer that goes on while its client reads. Null: nothing came within

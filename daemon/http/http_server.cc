@@ -30,8 +30,8 @@ constexpr milliseconds kRefuseWithin{100};
 /// reset. Four times what a server's socket usually holds by then, and no client may send for long.
 constexpr std::size_t kDiscardBytes = 262'144;
 constexpr milliseconds kDiscardWithin{500};
-/// The system's buffer of an answer that goes on. It holds a snapshot of 5000 units; a larger one
-/// would hold old states for a client that reads slowly.
+/// The system's buffer of an answer that goes on. A snapshot of 5000 units has room; a larger
+/// buffer would hold old states for a client that reads slowly.
 constexpr int kStreamBufferBytes = 131'072;
 /// The end of the server is seen within such a time.
 constexpr milliseconds kStreamPatience{100};
@@ -367,8 +367,8 @@ class HttpServer::Listener final : public httplib::Server {
     if (!answer.stream) return Fill(answer, response);
     served_connection->BeginStream();
     response->set_chunked_content_provider(
-        answer.content_type, [this, asked, stream = answer.stream,
-                              checked = Clock::now()](std::size_t, httplib::DataSink& out) mutable {
+        answer.content_type, [this, asked, stream = answer.stream, checked = Clock::now()](
+                                 std::size_t, httplib::DataSink& out) mutable {
           return GoOn(asked, stream, &checked, &out);
         });
   }

@@ -24,12 +24,10 @@ void AddPageRoutes(const Layout* layout, PlateFeed* feed, HttpRouter* router) {
                    return HttpAnswer{.content_type = std::string(asset.type),
                                      .body = std::string(asset.text)};
                  }});
-  router->Add({.path = "/layout",
-               .verb = "status",
-               .answer = [layout](const HttpRequest&, const Caller&) {
-                 return HttpAnswer{.content_type = "application/json",
-                                   .body = LayoutJson(*layout)};
-               }});
+  router->Add(
+      {.path = "/layout", .verb = "status", .answer = [layout](const HttpRequest&, const Caller&) {
+         return HttpAnswer{.content_type = "application/json", .body = LayoutJson(*layout)};
+       }});
   router->Add({.path = "/stream",
                .verb = "status",
                .answer = [feed](const HttpRequest&, const Caller&) { return Stream(feed); }});

@@ -1,7 +1,7 @@
-// The feed of the plate to its viewers. One thread makes each frame once for all of them. A viewer
-// that is one frame behind gets the next frame. One that is farther behind gets a snapshot of the
-// newest state. There is therefore no queue for a viewer, and one that reads slowly costs no memory
-// and holds up nobody. Without viewers no frame is made.
+// The feed of the plate to its viewers. A thread makes each frame once for all of them. A viewer
+// that is one frame behind gets the next frame. A viewer that is farther behind gets a snapshot of
+// the newest state. There is therefore no queue for a viewer, and one that reads slowly costs no
+// memory and holds up nobody. Without viewers no frame is made.
 #pragma once
 
 #include <chrono>

@@ -36,8 +36,7 @@ void PutGroup(std::span<const PlateUnit> units, std::size_t count, std::size_t b
     const std::size_t at = out->size();
     out->append((units.size() + 7) / 8, '\0');
     for (std::size_t i = 0; i < units.size(); ++i)
-      if (belongs(i))
-        (*out)[at + i / 8] = static_cast<char>((*out)[at + i / 8] | (1 << (i % 8)));
+      if (belongs(i)) (*out)[at + i / 8] = static_cast<char>((*out)[at + i / 8] | (1 << (i % 8)));
   }
   for (std::size_t i = 0; i < units.size(); ++i) {
     if (!belongs(i)) continue;
@@ -79,10 +78,11 @@ std::string Encode(const PlateFrameHead& head, std::span<const PlateUnit> units,
   Put(static_cast<std::uint32_t>(whole), &out);
   Put(static_cast<std::uint32_t>(angles), &out);
   out += head.facts;
-  PutGroup(units, whole, kWholeBytes, [&](std::size_t i) { return changes[i] == Change::kWhole; },
-           &out);
-  PutGroup(units, angles, kAnglesBytes,
-           [&](std::size_t i) { return changes[i] == Change::kAngles; }, &out);
+  PutGroup(
+      units, whole, kWholeBytes, [&](std::size_t i) { return changes[i] == Change::kWhole; }, &out);
+  PutGroup(
+      units, angles, kAnglesBytes, [&](std::size_t i) { return changes[i] == Change::kAngles; },
+      &out);
   const auto length = static_cast<std::uint32_t>(out.size() - 4);
   std::memcpy(out.data(), &length, sizeof length);
   return out;
@@ -182,8 +182,7 @@ Result<PlateFrameHead> DecodeFrame(std::string_view frame, std::vector<PlateUnit
   return head;
 }
 
-PlateEncoder::PlateEncoder(std::size_t units, Options options)
-    : options_(options), sent_(units) {}
+PlateEncoder::PlateEncoder(std::size_t units, Options options) : options_(options), sent_(units) {}
 
 std::string PlateEncoder::Next(const PlateTable& table, WallTime now) {
   // Wall time may step back: what seems to lie ahead is due.
@@ -194,10 +193,8 @@ std::string PlateEncoder::Next(const PlateTable& table, WallTime now) {
                          (table.at() != status_ && is_due(facts_at_, options_.facts_period_ns));
   const bool changed = table.units() != sent_;
   if (!facts_due && !changed && !is_due(last_at_, options_.heartbeat_period_ns)) return {};
-  PlateFrameHead head{.kind = PlateFrameKind::kDelta,
-                      .number = ++number_,
-                      .made = now,
-                      .status = table.at()};
+  PlateFrameHead head{
+      .kind = PlateFrameKind::kDelta, .number = ++number_, .made = now, .status = table.at()};
   if (facts_due) {
     facts_ = table.Facts();
     head.facts = facts_;

@@ -37,7 +37,7 @@ namespace focalfleet {
 
 enum class PlateFrameKind : std::uint8_t { kSnapshot = 1, kDelta = 2 };
 
-/// What a frame says beside the units.
+/// The content of a frame beside the units.
 struct PlateFrameHead {
   PlateFrameKind kind = PlateFrameKind::kSnapshot;
   std::uint32_t number = 0;

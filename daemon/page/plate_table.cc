@@ -24,7 +24,8 @@ std::uint16_t ErrorCode16(double error_mm) {
 
 /// The middle of an interval; of a known place the place itself.
 AxisAngles PlaceIn(const UnitStatusValue& status) {
-  return {(status.low_deg[0] + status.high_deg[0]) / 2, (status.low_deg[1] + status.high_deg[1]) / 2};
+  return {(status.low_deg[0] + status.high_deg[0]) / 2,
+          (status.low_deg[1] + status.high_deg[1]) / 2};
 }
 
 }  // namespace
@@ -57,8 +58,7 @@ PlateUnit PlateTable::CodeOf(PositionerIndex i, const UnitStatusValue& status) c
   if (witness >= Witness::kReported && code.target_theta != kNoCode) {
     const PointFp stands = FibreAt(unit, place);
     const PointFp wanted = FibreAt(unit, target);
-    code.error =
-        ErrorCode16(std::hypot(stands.x_mm - wanted.x_mm, stands.y_mm - wanted.y_mm));
+    code.error = ErrorCode16(std::hypot(stands.x_mm - wanted.x_mm, stands.y_mm - wanted.y_mm));
   }
   return code;
 }

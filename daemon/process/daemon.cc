@@ -321,8 +321,8 @@ Status Daemon::StartThreads() {
                                                   .threads = signal_.get(),
                                                   .hang_up = &ReopenLog}));
   ServeMetrics();
-  FOCALFLEET_TRY_ASSIGN(doors_.http, 
-                        OpenHttp(config_.http, config_.control.socket, *layout_, status_.page.get()));
+  FOCALFLEET_TRY_ASSIGN(
+      doors_.http, OpenHttp(config_.http, config_.control.socket, *layout_, status_.page.get()));
   return {};
 }
 

@@ -87,12 +87,13 @@ Result<std::unique_ptr<HttpServer>> OpenHttp(const DaemonConfig::Http& http,
                           .names = std::move(names),
                           .router = std::move(router),
                           .tls = std::move(tls),
-                          .tell = [](const std::string& trouble) {
-                            if (trouble.empty())
-                              spdlog::info("HTTP is served again");
-                            else
-                              spdlog::warn("no HTTP, it is tried again: {}", trouble);
-                          },
+                          .tell =
+                              [](const std::string& trouble) {
+                                if (trouble.empty())
+                                  spdlog::info("HTTP is served again");
+                                else
+                                  spdlog::warn("no HTTP, it is tried again: {}", trouble);
+                              },
                           .limits = {.streams = http.viewers_max}});
 }
 

@@ -10,15 +10,14 @@ namespace {
 void OpenPublisher(const DaemonConfig::Dds& dds, StatusOutput* out) {
   DdsTroubles* const troubles = out->troubles.get();
   out->publisher = std::make_unique<RenewingStatusPublisher>(RenewingStatusPublisher::Options{
-      .join = {.join = [options =
-                            DdsOptionsOf(dds)] { return StatusPublisher::Create(options); },
+      .join = {.join = [options = DdsOptionsOf(dds)] { return StatusPublisher::Create(options); },
                .tell =
                    [troubles](const std::string& trouble) {
                      troubles->Report(AlarmName::kDdsMissing, "status", trouble);
                    }},
       .renews = !dds.security.empty()});
-  out->credentials = WatchCredentials(
-      dds, troubles, [publisher = out->publisher.get()] { publisher->Renew(); });
+  out->credentials =
+      WatchCredentials(dds, troubles, [publisher = out->publisher.get()] { publisher->Renew(); });
 }
 
 }  // namespace

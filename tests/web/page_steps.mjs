@@ -45,6 +45,7 @@ async function night(browser) {
   await dropFile(tab, "night-1.csv", targets());
   await textOf(tab, "#preview", "Preview of night-1.csv");
   await textOf(tab, "#preview", `of ${given.count} targets`);
+  await tab.screenshot({path: `${given.out}/preview.png`});
   assert.ok(!sent.includes("apply"), "a preview applies nothing");
   await tab.click("#apply");
   await textOf(tab, "#configuration", /night-1.csv is under way/);
@@ -59,8 +60,10 @@ async function night(browser) {
   await dropFile(tab, "night-2.csv", targets());
   await tab.click("#apply");
   await textOf(tab, "#fleet-summary", /moving/);
+  await tab.screenshot({path: `${given.out}/moving.png`});
   await tab.click("#stop");
   await textOf(tab, "#configuration", /stopped/);
+  await tab.screenshot({path: `${given.out}/stopped.png`});
 
   say("a unit: arms, knowledge, moves newest first");
   await tab.fill("#find-id", "7");
@@ -76,6 +79,7 @@ async function night(browser) {
   await alarm.locator("summary").click();
   await alarm.locator(".runbook li").first().waitFor();
   assert.match(await alarm.innerText(), /Do:/);
+  await tab.screenshot({path: `${given.out}/alarm.png`});
   await alarm.getByRole("button", {name: "Mute"}).click();
   await textOf(tab, "#alarms", "Give a reason");
   const open = await tab.locator("#alarms li").count();
@@ -92,6 +96,7 @@ async function night(browser) {
   assert.ok(await tab.evaluate(() => window.focalfleetPage.plate.isStale));
   await tab.click("#stop");
   await textOf(tab, "#stop-state", "NOT STOPPED");
+  await tab.screenshot({path: `${given.out}/stale.png`});
   await world("start-daemon");
   await isLive(tab);
   assert.ok(await tab.locator("#stale").isHidden());

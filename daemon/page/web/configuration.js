@@ -105,7 +105,7 @@ export class Configuration {
       onclick: () => this.apply(apply, corrections.value)},
     `Move ${counted(preview.moving, "unit")}`), "apply");
     this.say(make("h3", {}, `Preview of ${this.file.source}`), make("dl", {},
-        make("dt", {}, "served"), make("dd", {}, `${preview.served} of ` +
+        make("dt", {}, "served"), make("dd", {}, `${preview.served.toLocaleString("en")} of ` +
             counted(preview.targeted, "target")),
         make("dt", {}, "takes"), make("dd", {}, duration(preview.makespan_s)),
         make("dt", {}, "power"), make("dd", {}, `at most ${preview.peak_power_W.toFixed(0)} W`)),

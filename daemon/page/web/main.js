@@ -27,7 +27,7 @@ class Page {
     this.linkState = "waiting";
     this.linkText = "";
     this.recountAt_ms = 0;
-    setInterval(() => this.showAge(), 250);
+    setInterval(() => this.showAge(), 500);
   }
 
   async begin() {
@@ -77,11 +77,6 @@ class Page {
       this.plate.recolour();
       this.showLegend();
     });
-    const draw = (now_ms) => {
-      this.plate.drawIfDue(now_ms);
-      requestAnimationFrame(draw);
-    };
-    requestAnimationFrame(draw);
   }
 
   openThemes() {

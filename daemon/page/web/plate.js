@@ -45,8 +45,24 @@ export class Plate {
     this.marked = [];  // units that a preview does not serve
     this.isStale = true;
     this.times_ms = [];  // of drawing, the newest last
-    this.dirty = true;
+    this.isAsked = false;
     this.recolour();
+  }
+
+  /** Something has changed: the browser is asked for a moment to draw. At rest it is not. */
+  set dirty(isDirty) {
+    this.isDirty = isDirty;
+    if (isDirty) this.ask();
+  }
+
+  ask() {
+    if (this.isAsked) return;
+    this.isAsked = true;
+    requestAnimationFrame((now_ms) => {
+      this.isAsked = false;
+      this.drawIfDue(now_ms);
+      if (this.turning.size > 0) this.ask();
+    });
   }
 
   setTheme(theme) {
@@ -110,8 +126,8 @@ export class Plate {
   /** The frame is read: units that no longer turn are where it has them. */
   endFrame() {
     for (const u of this.before) this.place(u, this.fleet.theta[u], this.fleet.phi[u]);
+    if (this.before.size + this.turning.size > 0) this.dirty = true;
     this.before = null;
-    this.dirty = true;
   }
 
   place(u, theta, phi) {
@@ -175,9 +191,9 @@ export class Plate {
 
   /** Draws where something has changed. */
   drawIfDue(now_ms) {
-    this.turn(now_ms);
-    if (!this.dirty || !this.theme) return;
     const begun = performance.now();
+    this.turn(now_ms);
+    if (!this.isDirty || !this.theme) return;
     this.dirty = false;
     if (this.view.pitch_px < kNear_px) this.drawFar();
     else this.near.draw(this.view.visible());
@@ -202,7 +218,7 @@ export class Plate {
       raster.dot((x_mm - left) * scale, (top - y_mm) * scale,
           Math.max(2, 0.8 * radius_mm * scale), of32.obstacle);
     const table = theme.entries.map(({colour}) => of32[colour]);
-    const wide = Math.max(1.4, 2 * fleet.half_width_mm[0] * scale);
+    const wide = Math.max(1.8, 2 * fleet.half_width_mm[0] * scale);
     const thin = Math.max(0.7, 0.3 * wide);
     const dot = Math.max(1, 0.09 * fleet.pitch_mm * scale);
     for (let u = 0; u < fleet.count; ++u) {

@@ -88,8 +88,8 @@ class PageStreamTest : public ::testing::Test {
             std::make_shared<TokenRegister>(TokenRegister::Options{.path = folder_ / "tokens.csv"}),
         .viewer_without_token = viewer_without_token});
     AddPageRoutes(&layout_, &feed_, router.get());
-    server_ = std::make_unique<HttpServer>(HttpServer::Options{
-        .address = "127.0.0.1", .router = std::move(router), .limits = limits});
+    server_ = std::make_unique<HttpServer>(
+        HttpServer::Options{.address = "127.0.0.1", .router = std::move(router), .limits = limits});
     ASSERT_TRUE(WaitUntil([&] { return server_->port() != 0; }, kPatienceMs));
   }
   Client Ask(const std::string& path, const std::string& token, const std::string& more = "",
@@ -103,7 +103,7 @@ class PageStreamTest : public ::testing::Test {
   test::ScratchFolder folder_;
   std::vector<Token> tokens_;
   std::string viewer_;
-  Layout layout_ = Layout::Create(MakeHexLayout({.count = 2000})).value();
+  Layout layout_ = Layout::Create(MakeHexLayout({.count = 2000}), {}).value();
   PlateFeed feed_{{.layout = &layout_, .viewers_max = 2, .pause = milliseconds(0)}};
   std::unique_ptr<HttpServer> server_;  // ends before the feed
   bool toggled_ = false;

@@ -61,7 +61,7 @@ class PlateFeedTest : public ::testing::Test {
     return AngleCode(theta_deg + layout_.unit({0}).theta().zero_deg);
   }
 
-  Layout layout_ = Layout::Create(MakeHexLayout({.count = kUnits})).value();
+  Layout layout_ = Layout::Create(MakeHexLayout({.count = kUnits}), {}).value();
   std::unique_ptr<PlateFeed> feed_;
 };
 

@@ -30,7 +30,7 @@ class PlateTableTest : public ::testing::Test {
     return table_.units()[4];
   }
 
-  Layout layout_ = Layout::Create(MakeHexLayout({.count = 40})).value();
+  Layout layout_ = Layout::Create(MakeHexLayout({.count = 40}), {}).value();
   PlateTable table_{&layout_};
   UnitStatusValue status_;
 };
@@ -113,7 +113,7 @@ TEST_F(PlateTableTest, FactsAreJsonWhateverTheFleetSays) {
 }
 
 TEST(PlateLayout, HasEachUnitInTheOrderOfFrames) {
-  const Layout layout = Layout::Create(MakeHexLayout({.count = 40})).value();
+  const Layout layout = Layout::Create(MakeHexLayout({.count = 40}), {}).value();
   const auto json = nlohmann::json::parse(LayoutJson(layout));
   EXPECT_EQ(json["count"], 40);
   ASSERT_EQ(json["units"]["id"].size(), 40u);
