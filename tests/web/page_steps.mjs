@@ -23,6 +23,11 @@ async function night(browser) {
   await textOf(tab, "#link", "signed out");
   const sent = watchVerbs(tab);
 
+  say("a wrong token is refused, with the daemon's words");
+  await tab.fill("#token", "fft_wrong");
+  await tab.press("#token", "Enter");
+  await textOf(tab, "#token-reason", "the token is not valid");
+
   say("a viewer looks on, and cannot move anything");
   await signIn(tab, "viewer");
   await isLive(tab);

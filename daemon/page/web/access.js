@@ -25,10 +25,14 @@ export class Access {
   }
 
   async use(token) {
+    const before = this.api.token;
     this.api.token = token;
     await this.refresh();
     if (this.role === "none") {
-      setText(find("token-reason"), this.why);
+      const {why} = this;
+      this.api.token = before;  // a slip of the hand ends no stream
+      if (before) await this.refresh();
+      setText(find("token-reason"), `Not signed in: ${why}.`);
       return;
     }
     find("token").value = "";

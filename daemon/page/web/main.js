@@ -16,6 +16,11 @@ import {UnitPanel} from "/page/unit.js";
 const kStale_ms = 2500;  // status comes each second at least
 const kRecount_ms = 500;
 
+/** An age in whole seconds: a text that changes all the time is neither calm nor cheap. */
+function inWords(age_ms) {
+  return age_ms < 1000 ? "less than 1 s" : duration(Math.floor(age_ms / 1000)).replace(".0", "");
+}
+
 class Page {
   constructor() {
     this.api = new Api();
@@ -137,11 +142,11 @@ class Page {
     const link = find("link");
     setText(link, live || this.linkState !== "live" ? words[this.linkState] : "daemon is late");
     link.className = `pill ${live ? "live" : this.linkState === "live" ? "waiting" : this.linkState}`;
-    setText(find("age"), age_ms === Infinity ? "no data yet" : `data ${duration(age_ms / 1000)} old`);
+    setText(find("age"), age_ms === Infinity ? "no data yet" : `data ${inWords(age_ms)} old`);
     const stale = find("stale");
     stale.hidden = live;
     if (!live) setText(stale, age_ms === Infinity ? this.linkText || "Waiting for the daemon."
-      : `Old: the plate as it was ${duration(Math.round(age_ms / 1000))} ago. ${this.linkText}`);
+      : `Old: the plate as it was ${inWords(age_ms)} ago. ${this.linkText}`);
     if (!this.plate) return;
     if (this.plate.isStale !== !live) {
       this.plate.isStale = !live;
