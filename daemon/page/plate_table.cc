@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 std::uint16_t ErrorCode16(double error_mm) {
-  constexpr double kStepsPerMm = 1e4;
+  constexpr double kStepsPerMm = 2000;
   constexpr double kMost = kNoCode - 1;
   if (!std::isfinite(error_mm)) return kNoCode;
   return static_cast<std::uint16_t>(std::min(kMost, std::round(error_mm * kStepsPerMm)));

@@ -8,6 +8,7 @@ import http.client
 import json
 import os
 import pathlib
+import socket
 import subprocess
 import sys
 import threading
@@ -28,9 +29,11 @@ class Viewer(threading.Thread):
 
     def __init__(self, fleet, reads=True):
         super().__init__(daemon=True)
-        self.connection = http.client.HTTPConnection("127.0.0.1", fleet.port)
-        self.connection.request("GET", "/stream", headers={"Authorization": f"Bearer {fleet.tokens['viewer']}"})
-        self.answer = self.connection.getresponse()
+        connection = http.client.HTTPConnection("127.0.0.1", fleet.port)
+        connection.connect()
+        self.socket = connection.sock
+        connection.request("GET", "/stream", headers={"Authorization": f"Bearer {fleet.tokens['viewer']}"})
+        self.answer = connection.getresponse()
         assert self.answer.status == 200
         self.bytes = 0
         self.reads = reads
@@ -65,7 +68,7 @@ def viewers_figures(fleet, viewers_wanted):
                           "predicted_s": result["makespan_predicted_s"],
                           "kB_per_s_each": round(each / took_s / 1000, 1)}), flush=True)  # fmt: skip
         for viewer in viewers:
-            viewer.connection.close()
+            viewer.socket.shutdown(socket.SHUT_RDWR)
 
 
 def main():

@@ -65,6 +65,9 @@ async function night(browser) {
   await dropFile(tab, "night-2.csv", targets());
   await tab.click("#apply");
   await textOf(tab, "#fleet-summary", /moving/);
+  await tab.waitForFunction((count) =>
+    [...document.querySelectorAll("#legend li")].some(({textContent}) =>
+      textContent === `${count}moves`), given.count);
   await tab.screenshot({path: `${given.out}/moving.png`});
   await tab.click("#stop");
   await textOf(tab, "#configuration", /stopped/);
@@ -73,7 +76,7 @@ async function night(browser) {
   say("a unit: arms, knowledge, moves newest first");
   await tab.fill("#find-id", "7");
   await tab.press("#find-id", "Enter");
-  await textOf(tab, "#unit", "configuration 1");
+  await textOf(tab, "#unit tbody", /arrived/);
   assert.match(await tab.locator("#unit").innerText(), /theta[\s\S]*phi[\s\S]*node/);
 
   say("an alarm: the runbook's words, mute with a reason, acknowledge");

@@ -2,12 +2,11 @@
 
   page_test.py PROGRAMS NODE_FOLDER OUT_FOLDER SCENARIO
 
-SCENARIO: night, looks, or frame_time. The steps are in page_steps.mjs; they ask here for what the
+SCENARIO: night or looks. The steps are in page_steps.mjs; they ask here for what the
 world around the page does: the daemon ends, comes back, a bus dies.
 """
 
 import json
-import os
 import pathlib
 import subprocess
 import sys
@@ -15,7 +14,7 @@ import sys
 from web_fleet import WebFleet
 
 HERE = pathlib.Path(__file__).resolve().parent
-COUNTS = {"night": 120, "looks": 5000, "frame_time": 5000}
+COUNTS = {"night": 120, "looks": 5000}
 
 
 def world(fleet, line):
@@ -61,8 +60,7 @@ def main():
     programs, node_folder, out, scenario = sys.argv[1:5]
     out = pathlib.Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    count = int(os.environ.get("FOCALFLEET_WEB_UNITS", COUNTS[scenario]))
-    with WebFleet(programs, count, speed=1 if scenario == "frame_time" else 4) as fleet:
+    with WebFleet(programs, COUNTS[scenario], speed=4) as fleet:
         return run(fleet, pathlib.Path(node_folder).resolve(), out.resolve(), scenario)
 
 

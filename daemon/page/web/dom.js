@@ -33,7 +33,8 @@ export function counted(count, one, many = `${one}s`) {
 }
 
 export function micrometres(um) {
-  return Number.isFinite(um) ? `${um.toFixed(um < 10 ? 1 : 0)} µm` : "–";
+  if (!Number.isFinite(um)) return "–";
+  return um < 1000 ? `${um.toFixed(um < 10 ? 1 : 0)} µm` : `${(um / 1000).toFixed(1)} mm`;
 }
 
 /** The time of day of an instant of the daemon, in UTC like its logs. */

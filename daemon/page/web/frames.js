@@ -112,7 +112,7 @@ export class Fleet {
     this.targetTheta[u] = angleOf(view.getUint16(from + 4, true));
     this.targetPhi[u] = angleOf(view.getUint16(from + 6, true));
     const error = view.getUint16(from + 8, true);
-    this.error_um[u] = error === kNoCode ? NaN : error / 10;
+    this.error_um[u] = error === kNoCode ? NaN : error / 2;
     this.phase[u] = view.getUint8(from + 10);
     this.witness[u] = view.getUint8(from + 11);
     this.outcome[u] = view.getUint8(from + 12);

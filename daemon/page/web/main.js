@@ -14,7 +14,7 @@ import {Stream} from "/page/stream.js";
 import {UnitPanel} from "/page/unit.js";
 
 const kStale_ms = 2500;  // status comes each second at least
-const kRecount_ms = 500;
+const kLegend_ms = 500;
 
 /** An age in whole seconds: a text that changes all the time is neither calm nor cheap. */
 function inWords(age_ms) {
@@ -31,7 +31,8 @@ class Page {
     this.plate = null;
     this.linkState = "waiting";
     this.linkText = "";
-    this.recountAt_ms = 0;
+    this.legendAt_ms = 0;
+    this.isLegendOld = false;
     setInterval(() => this.showAge(), 500);
   }
 
@@ -109,17 +110,17 @@ class Page {
     });
     plate.endFrame();
     if (snapshot) plate.placeAll();
-    // Counting all units is spread, where hundreds change with each frame.
-    this.recount = this.recount || states;
-    if (snapshot || (this.recount && now_ms > this.recountAt_ms)) this.countAgain(now_ms);
+    if (snapshot || states) plate.reindex();
+    // The legend is written now and then, where hundreds change with each frame.
+    this.isLegendOld = this.isLegendOld || states;
+    if (snapshot || (this.isLegendOld && now_ms > this.legendAt_ms)) this.renewLegend(now_ms);
     if (facts) this.showFacts();
     this.showAge();
   }
 
-  countAgain(now_ms) {
-    this.recount = false;
-    this.recountAt_ms = now_ms + kRecount_ms;
-    this.plate.reindex();
+  renewLegend(now_ms) {
+    this.isLegendOld = false;
+    this.legendAt_ms = now_ms + kLegend_ms;
     this.showLegend();
   }
 
@@ -152,9 +153,9 @@ class Page {
       this.plate.isStale = !live;
       this.plate.dirty = true;
     }
-    const due = this.recount && now_ms > this.recountAt_ms;
-    const ages = find("theme").value === "age" && now_ms > this.recountAt_ms + kRecount_ms;
-    if (due || ages) this.countAgain(now_ms);
+    const isByAge = find("theme").value === "age";
+    if (isByAge && now_ms > this.legendAt_ms) this.plate.reindex();
+    if ((this.isLegendOld || isByAge) && now_ms > this.legendAt_ms) this.renewLegend(now_ms);
   }
 
   showFacts() {

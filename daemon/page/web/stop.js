@@ -25,7 +25,7 @@ export class Stop {
     say("Stop is sent …");
     try {
       await this.api.ask("stop");
-      say(`Stop: the daemon has it (${new Date().toLocaleTimeString()}).`);
+      say(`Stop: the daemon has it (${new Date().toISOString().slice(11, 19)} UTC).`);
     } catch (error) {
       say(`NOT STOPPED: ${error.message}. At the host: focalfleet stop --direct`);
       if (error.status === 401) this.access.open("Stop needs a token: any role may stop.");

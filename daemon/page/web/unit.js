@@ -126,11 +126,11 @@ export class UnitPanel {
       this.history.replaceChildren(make("h3", {}, "Moves, newest first"), moves.length === 0
         ? make("p", {class: "hint"}, "It has not moved yet.")
         : make("table", {}, make("thead", {}, make("tr", {}, make("th", {scope: "col"}, "began, UTC"),
-            make("th", {scope: "col"}, "of"), make("th", {scope: "col"}, "end"))), this.body));
+            make("th", {scope: "col"}, "configuration"), make("th", {scope: "col"}, "end"))), this.body));
     }
     for (const move of moves)
       this.body.append(make("tr", {}, make("td", {}, clock(move.began)),
-          make("td", {}, `configuration ${move.configuration}`), make("td", {}, move.end)));
+          make("td", {}, String(move.configuration)), make("td", {}, move.end)));
     if (moves.length < kRowsOfPage) return;
     // ISO times have milliseconds; the earlier page ends there.
     const until_ns = Date.parse(moves.at(-1).began) * 1_000_000;
