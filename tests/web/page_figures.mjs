@@ -32,10 +32,10 @@ function browserCpu_s() {
 }
 
 /** A tab at rest, with nobody who asks it anything. */
-async function measureIdle() {
+async function measureIdle(what) {
   const cpu_s = browserCpu_s();
   await new Promise((resolve) => setTimeout(resolve, kMeasured_ms));
-  console.log(JSON.stringify({what: "at rest", units: given.count,
+  console.log(JSON.stringify({what, units: given.count,
     cpu_percent: Math.round(1e5 * (browserCpu_s() - cpu_s) / kMeasured_ms * 10) / 10}));
 }
 
@@ -75,12 +75,15 @@ async function measure(tab, what) {
 }
 
 await withBrowser(async (browser) => {
+  const blank = await browser.newPage();
+  await measureIdle("an empty tab");
+  await blank.close();
   const tab = await openTab(browser);
   tab.setDefaultTimeout(400_000);
   await signIn(tab, "operator");
   await isLive(tab);
   await tab.waitForFunction(() => window.focalfleetPage.fleet.facts !== null);
-  await measureIdle();
+  await measureIdle("at rest");
   await dropFile(tab, "targets.csv", readFileSync(given.targets, "utf8"));
   await tab.click("#apply");
   await tab.waitForFunction((count) => window.focalfleetPage.plate.turning.size > 0.5 * count,

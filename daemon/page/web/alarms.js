@@ -24,6 +24,39 @@ function fold(alarms) {
       kRanks[a.severity] - kRanks[b.severity] || (a.last < b.last ? 1 : -1));
 }
 
+/** A short tone for each alarm that is new, where somebody wants it. */
+class Sound {
+  constructor() {
+    this.context = null;  // a browser gives one to somebody who asked for it
+    this.played = 0;
+    this.known = null;
+    find("sound").addEventListener("click", () => {
+      this.context = this.context ? null : new AudioContext();
+      find("sound").setAttribute("aria-pressed", String(Boolean(this.context)));
+      setText(find("sound"), this.context ? "Sound is on" : "Sound is off");
+      if (this.context) this.play();
+    });
+  }
+
+  note(ids) {
+    const isNew = this.known !== null && ids.some((id) => !this.known.has(id));
+    this.known = new Set(ids);
+    if (isNew) this.play();
+  }
+
+  play() {
+    if (!this.context) return;
+    ++this.played;
+    const tone = this.context.createOscillator();
+    const volume = this.context.createGain();
+    volume.gain.value = 0.15;
+    tone.frequency.value = 660;
+    tone.connect(volume).connect(this.context.destination);
+    tone.start();
+    tone.stop(this.context.currentTime + 0.4);
+  }
+}
+
 export class Alarms {
   constructor(api, access, onUnit) {
     this.api = api;
@@ -34,6 +67,7 @@ export class Alarms {
     this.shownText = "";
     this.busy = false;
     this.version = -1;
+    this.sound = new Sound();
     setInterval(() => {
       if (!document.hidden) this.refresh();
     }, kPeriod_ms);
@@ -62,6 +96,8 @@ export class Alarms {
     const muted = answer.muted > 0 ? `, ${answer.muted} muted` : "";
     setText(find("alarms-summary"),
         answer.open === 0 && !muted ? "None is open." : `${answer.open} open${muted}.`);
+    this.sound.note(answer.alarms.filter(({state, muted}) => state === "open" && !muted)
+      .map(({id}) => id));
     document.title = answer.open > 0 ? `(${answer.open}) focalfleet` : "focalfleet";
     const text = JSON.stringify([answer, this.access.role]);
     if (text === this.shownText) return;  // nothing of the list is rebuilt under the pointer

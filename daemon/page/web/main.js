@@ -6,6 +6,7 @@ import {Api} from "/page/api.js";
 import {makeThemes} from "/page/colours.js";
 import {Configuration} from "/page/configuration.js";
 import {counted, duration, find, make, setText} from "/page/dom.js";
+import {Events} from "/page/events.js";
 import {Fleet, kPhases} from "/page/frames.js";
 import {Pointer} from "/page/pointer.js";
 import {Plate} from "/page/plate.js";
@@ -71,6 +72,7 @@ class Page {
     this.unit = new UnitPanel(this.api, this.plate, () => {});
     this.alarms = new Alarms(this.api, this.access, showUnit);
     this.configuration = new Configuration(this.api, this.access, this.plate, showUnit);
+    this.events = new Events(this.api);
     this.openThemes();
     new Pointer(this.plate, (u) => this.unit.select(u), () => this.showScale());
     const fit = () => {
@@ -167,6 +169,7 @@ class Page {
         (facts.store_failing ? ". The store fails: nothing new may move." : ""));
     this.configuration.note(facts);
     this.alarms.note(facts.alarms);
+    this.events.note(facts);
     const down = facts.buses.filter(({link}) => link !== "up");
     const load = Math.max(0, ...facts.buses.map((bus) => bus.load));
     find("buses").className = down.length > 0 ? "trouble" : "";
