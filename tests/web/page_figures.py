@@ -30,7 +30,7 @@ def cpu_s(pid):
 
 
 def cpu_by_name(before, after):
-    """The planner's work differs from one file of targets to the next, so names are told apart."""
+    """The planner's work differs from one file of targets to the next, so names stand apart."""
     names = {}
     for task, (name, seconds) in after.items():
         names[name] = names.get(name, 0) + seconds - before.get(task, ("", 0))[1]
