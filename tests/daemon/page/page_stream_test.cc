@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -51,11 +52,14 @@ class Client {
   Client& operator=(const Client&) = delete;
   ~Client() { ::close(fd_); }
 
-  /// Reads until the text is there, or to the end. All that came so far.
+  /// Reads until the text is there, or to the end, or for as long as patience lasts. All that came
+  /// so far.
   const std::string& ReadUntil(const std::string& text) {
     std::array<char, 4096> chunk{};
     pollfd watched{.fd = fd_, .events = POLLIN, .revents = 0};
-    while (read_.find(text) == std::string::npos && ::poll(&watched, 1, kPatienceMs) > 0) {
+    const auto until = std::chrono::steady_clock::now() + milliseconds(kPatienceMs);
+    while (read_.find(text) == std::string::npos && std::chrono::steady_clock::now() < until &&
+           ::poll(&watched, 1, kPatienceMs) > 0) {
       const ssize_t got = ::recv(fd_, chunk.data(), chunk.size(), 0);
       if (got <= 0) break;
       read_.append(chunk.data(), static_cast<std::size_t>(got));
