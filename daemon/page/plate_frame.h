@@ -24,14 +24,14 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
-#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/clock/wall_time.h"
 #include "daemon/page/plate_table.h"
+#include "protocol/base/result.h"
 
 namespace focalfleet {
 
