@@ -39,7 +39,7 @@ const std::vector<Group>& Groups() {
        {"status", "doctor", "unit", "state", "alarms", "events", "history", "watch",
         "measurements"}},
       {"Maintain units", {"disable", "enable", "adopt", "params"}},
-      {"Access", {"access", "audit", "token"}},
+      {"Access", {"access", "audit", "token", "page"}},
       {"Study and tune",
        {"campaign", "diagnose", "model", "simulate", "tune", "reproduce", "hall"}},
   };
@@ -209,6 +209,7 @@ std::unique_ptr<CommandLine> MakeCommandLine(AddStudy add_study) {
   AddModelCommands(line.get());
   AddStoreCommands(line.get());
   AddAccessCommands(line.get());
+  AddPageCommand(line.get());
   AddCanCommands(line.get());
   AddDoctorCommand(line.get());
   AddCompletionCommand(line.get());

@@ -30,6 +30,11 @@ constexpr milliseconds kRefuseWithin{100};
 /// reset. Four times what a server's socket usually holds by then, and no client may send for long.
 constexpr std::size_t kDiscardBytes = 262'144;
 constexpr milliseconds kDiscardWithin{500};
+/// The system's buffer of an answer that goes on. A snapshot of 5000 units has room; a larger
+/// buffer would hold old states for a client that reads slowly.
+constexpr int kStreamBufferBytes = 131'072;
+/// The end of the server is seen within such a time.
+constexpr milliseconds kStreamPatience{100};
 
 std::string PlainResponse(const char* status) {
   const std::string body = std::string(status) + "\n";
@@ -77,6 +82,12 @@ class Connection final : public httplib::Stream {
     request_bytes_ = limits_.request_bytes + limits_.body_bytes;
     ends_by_ = Clock::now() + limits_.admitted;
   }
+  /// The answer goes on: its next piece has so much time.
+  void BeginStream() const {
+    ::setsockopt(socket_, SOL_SOCKET, SO_SNDBUF, &kStreamBufferBytes, sizeof kStreamBufferBytes);
+  }
+  void AllowPiece() { ends_by_ = Clock::now() + limits_.stall; }
+  [[nodiscard]] bool ending() const { return ending_; }
   /// The request that is being answered.
   HttpRouter::Admission admission;
 
@@ -191,7 +202,8 @@ thread_local Connection* served_connection = nullptr;
 class BoundedPool final : public httplib::TaskQueue {
  public:
   explicit BoundedPool(const HttpLimits& limits)
-      : pool_(limits.served), places_(limits.served + limits.waiting) {}
+      : pool_(limits.served + limits.streams),
+        places_(limits.served + limits.streams + limits.waiting) {}
 
   void enqueue(std::function<void()> task) override {
     if (open_ >= places_) return task();
@@ -245,6 +257,8 @@ HttpRequest RequestOf(const httplib::Request& from) {
   request.content_type = from.get_header_value("Content-Type");
   request.content_encoding = from.get_header_value("Content-Encoding");
   request.address = from.remote_addr;
+  request.forwarded = from.has_header("Forwarded") || from.has_header("X-Forwarded-For") ||
+                      from.has_header("X-Real-IP") || from.has_header("Via");
   request.body = from.body;
   return request;
 }
@@ -267,7 +281,7 @@ class HttpServer::Listener final : public httplib::Server {
     // The path was compared with those of the routes before.
     Post(".*", [this](const httplib::Request& request, httplib::Response& response) {
       const Connection& connection = *served_connection;
-      Fill(options_.router->Answer(connection.admission, RequestOf(request)), &response);
+      Answer(connection.admission, RequestOf(request), &response);
     });
     set_payload_max_length(options_.limits.body_bytes);
   }
@@ -343,8 +357,39 @@ class HttpServer::Listener final : public httplib::Server {
     }
     if (!connection.admission.route->verb.empty()) connection.Admit();
     if (request.method == "POST") return HandlerResponse::Unhandled;  // its body comes first
-    Fill(options_.router->Answer(connection.admission, asked), response);
+    Answer(connection.admission, asked, response);
     return HandlerResponse::Handled;
+  }
+
+  void Answer(const HttpRouter::Admission& admission, const HttpRequest& asked,
+              httplib::Response* response) const {
+    const HttpAnswer answer = options_.router->Answer(admission, asked);
+    if (!answer.stream) return Fill(answer, response);
+    served_connection->BeginStream();
+    response->set_chunked_content_provider(
+        answer.content_type, [this, asked, stream = answer.stream, checked = Clock::now()](
+                                 std::size_t, httplib::DataSink& out) mutable {
+          return GoOn(asked, stream, &checked, &out);
+        });
+  }
+
+  /// The next piece of an answer is sent. False: the connection ends.
+  bool GoOn(const HttpRequest& asked, const HttpStream& stream, Clock::time_point* checked,
+            httplib::DataSink* out) const {
+    Connection& connection = *served_connection;
+    if (connection.ending()) return false;
+    if (Clock::now() - *checked >= options_.limits.recheck) {
+      *checked = Clock::now();
+      if (!options_.router->StillAdmits(connection.admission, asked)) return false;
+    }
+    const auto piece = stream(kStreamPatience);
+    if (!piece) {
+      out->done();
+      return true;
+    }
+    if (*piece == nullptr) return true;
+    connection.AllowPiece();
+    return out->write((*piece)->data(), (*piece)->size());
   }
 
   void ShowPage(const httplib::Request& request, httplib::Response* response) const {

@@ -43,6 +43,12 @@ struct HttpLimits {
   /// the core may wait for a plan.
   std::size_t body_bytes = std::size_t{16} << 20;
   std::chrono::milliseconds admitted{60'000};
+  /// Answers that go on (HttpAnswer::stream) have places of their own, and each of their pieces is
+  /// taken by the client within `stall`. Whether the request is still admitted is asked each
+  /// `recheck`.
+  std::size_t streams = 0;
+  std::chrono::milliseconds stall{5000};
+  std::chrono::milliseconds recheck{1000};
 };
 
 class HttpServer {

@@ -10,6 +10,12 @@ namespace focalfleet {
 namespace {
 
 constexpr std::string_view kBearer = "Bearer ";
+/// The name of callers without a token. No token can have it (access/token.h).
+constexpr const char* kNoToken = "(none, on this host)";
+
+bool IsOfThisHost(const HttpRequest& request) {
+  return !request.forwarded && (request.address.starts_with("127.") || request.address == "::1");
+}
 
 /// The media type without its parameters, in lower case.
 std::string MediaTypeOf(const std::string& content_type) {
@@ -64,6 +70,11 @@ std::optional<HttpAnswer> HttpRouter::Authenticate(const HttpRequest& request,
   if (options_.tokens == nullptr) return Unauthorized("no token is valid here");
   TokenRegister& tokens = *options_.tokens;
   const WallTime now = options_.now();
+  if (request.authorization.empty() && options_.viewer_without_token && IsOfThisHost(request)) {
+    *caller = {
+        .role = Role::kViewer, .door = Door::kHttp, .token = kNoToken, .address = request.address};
+    return CheckCaller(route, *caller);
+  }
   if (!request.authorization.starts_with(kBearer))
     return Unauthorized("a token is needed: Authorization: Bearer TOKEN");
   const auto found = tokens.Find(request.authorization.substr(kBearer.size()), now);
@@ -75,12 +86,24 @@ std::optional<HttpAnswer> HttpRouter::Authenticate(const HttpRequest& request,
   }
   *caller = {
       .role = found->role, .door = Door::kHttp, .token = found->name, .address = request.address};
-  if (route.verb != "stop" && !tokens.MayAsk(found->name, now))
+  return CheckCaller(route, *caller);
+}
+
+std::optional<HttpAnswer> HttpRouter::CheckCaller(const HttpRoute& route,
+                                                  const Caller& caller) const {
+  if (route.verb != "stop" && !options_.tokens->MayAsk(caller.token, options_.now()))
     return TooMany("too many requests of this token");
-  const Status right = CheckRight(*caller, route.verb, nlohmann::json::object());
+  const Status right = CheckRight(caller, route.verb, nlohmann::json::object());
   if (right) return std::nullopt;
   options_.log("http: " + right.error().text);
   return HttpFailure(403, "refused", right.error().text);
+}
+
+bool HttpRouter::StillAdmits(const Admission& admission, const HttpRequest& request) const {
+  if (admission.route->verb.empty() || request.authorization.empty()) return true;
+  const auto found =
+      options_.tokens->Find(request.authorization.substr(kBearer.size()), options_.now());
+  return found && found->name == admission.caller.token && found->role == admission.caller.role;
 }
 
 HttpRouter::Admission HttpRouter::Admit(const HttpRequest& request) const {

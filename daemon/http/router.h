@@ -36,6 +36,8 @@ class HttpRouter {
   struct Options {
     std::shared_ptr<TokenRegister> tokens;  // none: routes with a verb admit nobody
     bool tls = false;                       // the scheme of its own Origin
+    /// A request without a token that comes from this host is a viewer's.
+    bool viewer_without_token = false;
     /// Receives refusals worth a line of the log; the caller limits them.
     std::function<void(const std::string&)> log = [](const std::string&) {};
     std::function<WallTime()> now = &WallTime::Now;
@@ -52,6 +54,9 @@ class HttpRouter {
     Caller caller = {};
   };
   [[nodiscard]] Admission Admit(const HttpRequest& request) const;
+  /// A request that was admitted would be admitted again: its token is still valid, with the same
+  /// role. Long answers ask this now and then.
+  [[nodiscard]] bool StillAdmits(const Admission& admission, const HttpRequest& request) const;
   /// Pre: the request was admitted.
   [[nodiscard]] HttpAnswer Answer(const Admission& admission, const HttpRequest& request) const;
 
@@ -62,6 +67,8 @@ class HttpRouter {
   [[nodiscard]] std::optional<HttpAnswer> Authenticate(const HttpRequest& request,
                                                        const HttpRoute& route,
                                                        Caller* caller) const;
+  [[nodiscard]] std::optional<HttpAnswer> CheckCaller(const HttpRoute& route,
+                                                      const Caller& caller) const;
 
   Options options_;
   std::vector<HttpRoute> routes_;

@@ -252,6 +252,10 @@ void CheckHttp(const DaemonConfig::Http& http, Reader* reader) {
   reader->Require(http.port == 0 || http.tls() || IsLoopback(http.address), "http", "certificate",
                   "http.address " + http.address +
                       " is reached from elsewhere: that takes http.certificate and http.key");
+  reader->Require(!http.viewer_without_token || IsLoopback(http.address), "http",
+                  "viewer_without_token",
+                  "http.viewer_without_token needs a loopback address: behind another one a proxy "
+                  "would make everybody a viewer");
   reader->Require(http.port == 0 || !http.tokens.empty(), "http", "tokens",
                   "http.tokens must name a file: without tokens nobody is admitted");
 }

@@ -61,6 +61,8 @@ struct DaemonConfig {
     std::string key;                    // PEM
     std::string tokens = "tokens.csv";  // access/token.h
     std::string tokens_at;              // file:line, for messages
+    std::uint32_t viewers_max = 16;     // pages that look on at once; 0: none may
+    bool viewer_without_token = false;  // requests from this host without a token are a viewer's
     [[nodiscard]] bool tls() const { return !certificate.empty(); }
   } http;
   struct Bus {

@@ -120,6 +120,11 @@ void VisitKeys(Config* c, Visitor* visit) {
               "Certificate with its chain, PEM; empty: plain HTTP, on the loopback interface only");
   visit->Path("key", &c->http.key, "Key of the certificate, PEM");
   visit->Path("tokens", &c->http.tokens, "File of tokens, made by focalfleet token add");
+  visit->Whole("viewers_max", &c->http.viewers_max, {0, 256},
+               "Pages that look on at once; one more is refused with a text");
+  visit->Flag("viewer_without_token", &c->http.viewer_without_token,
+              "Whether requests from this host without a token are a viewer's: every user of the "
+              "host may then look on, and stop the fleet");
   visit->Section("bus", "The CAN buses");
   visit->Index(
       "port", &c->bus.port, kPortKindNames,

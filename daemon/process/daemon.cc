@@ -14,7 +14,6 @@
 #include "daemon/camera/camera_folder.h"
 #include "daemon/clock/process_time.h"
 #include "daemon/loop/event_loop.h"
-#include "daemon/loop/status_thread.h"
 #include "daemon/metrics/metrics_endpoint.h"
 #include "daemon/metrics/metrics_sampler.h"
 #include "daemon/process/bounded_end.h"
@@ -26,9 +25,8 @@
 #include "daemon/process/http_door.h"
 #include "daemon/process/log.h"
 #include "daemon/process/slow_end.h"
+#include "daemon/process/status_output.h"
 #include "daemon/process/store_upkeep.h"
-#include "daemon/status/dds_troubles.h"
-#include "daemon/status/renewing_status_publisher.h"
 #include "daemon/store/store.h"
 #include "daemon/store/store_reader.h"
 #include "daemon/systemd/notify_socket.h"
@@ -60,16 +58,6 @@ struct Service {
   Heartbeat camera;
   std::unique_ptr<Watchdog> watchdog;  // none: the manager expects no sign of life
   std::unique_ptr<ServiceReport> report;
-};
-
-/// The fleet's status on its way to DDS.
-struct StatusOutput {
-  std::unique_ptr<DdsTroubles> troubles;
-  std::unique_ptr<RenewingStatusPublisher> publisher;  // none: DDS is off
-  std::unique_ptr<CredentialWatch> credentials;        // none: no DDS Security
-  std::unique_ptr<StatusScheduler> scheduler;          // none: DDS is off
-  std::unique_ptr<StatusThread> thread;  // none: DDS is off. Ends before the publisher
-  std::unique_ptr<BoundedEnd> ending;
 };
 
 /// Where places of units come from. The thread ends before the workers that it uses.
@@ -128,10 +116,8 @@ class Daemon {
   std::function<void()> Answering(Heartbeat* heartbeat);
   void OpenService();
   StoreThread::Sinks StoreSinks();
-  Status StartStatusThread();
   Status OpenRequestHandler();
   Status RestoreLastModel();
-  void OpenStatus();
   void OpenMetrics();
   void ServeMetrics();
   PlanDone Plan(const PlannerWork& work, const std::atomic<bool>& ending,
@@ -181,7 +167,7 @@ Status Daemon::Start() {
       std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()), std::move(ports));
   FOCALFLEET_TRY(OpenCamera());
   FOCALFLEET_TRY_ASSIGN(measuring_.carriers, OpenFibreCarriers(config_.hall, *layout_));
-  OpenStatus();
+  OpenStatusOutput(config_, *layout_, service_.started, clock_, &status_);
   OpenMetrics();
   coordinator_ = std::make_unique<Coordinator>(
       layout_.get(), std::vector<UnitDrive>(layout_->size(), config_.drive), config_.timing,
@@ -212,25 +198,6 @@ Status Daemon::OpenRequestHandler() {
 Status Daemon::RestoreLastModel() {
   FOCALFLEET_TRY_ASSIGN(const auto reader, StoreReader::Open(config_.store.path));
   return RestoreModel(reader.get(), models_.get());
-}
-
-void Daemon::OpenStatus() {
-  if (config_.dds.enabled || config_.camera.dds) WarnOfDdsEnvironment(config_.dds);
-  if (!config_.dds.enabled) return;
-  status_.publisher = std::make_unique<RenewingStatusPublisher>(RenewingStatusPublisher::Options{
-      .join = {.join = [dds = DdsOptionsOf(config_.dds)] { return StatusPublisher::Create(dds); },
-               .tell =
-                   [this](const std::string& trouble) {
-                     status_.troubles->Report(AlarmName::kDdsMissing, "status", trouble);
-                   }},
-      .renews = !config_.dds.security.empty()});
-  status_.credentials =
-      WatchCredentials(config_.dds, status_.troubles.get(), [this] { status_.publisher->Renew(); });
-  status_.scheduler = std::make_unique<StatusScheduler>(
-      layout_->size(),
-      StatusScheduler::Options{
-          .rate_hz = config_.dds.rate_hz, .version = Version(), .started = service_.started},
-      clock_);
 }
 
 void Daemon::OpenMetrics() {
@@ -307,21 +274,9 @@ std::function<void()> Daemon::Answering(Heartbeat* heartbeat) {
   };
 }
 
-Status Daemon::StartStatusThread() {
-  if (status_.publisher == nullptr) return {};
-  FOCALFLEET_TRY_ASSIGN(
-      status_.thread,
-      StatusThread::Create(
-          {.publish =
-               [this](const StatusBatch& status) { return status_.publisher->Publish(status); },
-           .alarm = [this](const AlarmValue& alarm) { status_.publisher->Publish(alarm); },
-           .room = [this] { stored_.writer->Wake(); },
-           .alive = Answering(&service_.status)}));
-  return {};
-}
-
 Status Daemon::StartThreads() {
-  FOCALFLEET_TRY(StartStatusThread());
+  FOCALFLEET_TRY(
+      StartStatusThread([this] { stored_.writer->Wake(); }, Answering(&service_.status), &status_));
   StoreThread::Sinks sinks = StoreSinks();
   FOCALFLEET_TRY_ASSIGN(sinks.upkeep, UpkeepOf(store_.get(), config_.store.keep_days));
   FOCALFLEET_TRY_ASSIGN(stored_.writer, StoreThread::Create(std::move(sinks), signal_.get()));
@@ -366,7 +321,8 @@ Status Daemon::StartThreads() {
                                                   .threads = signal_.get(),
                                                   .hang_up = &ReopenLog}));
   ServeMetrics();
-  FOCALFLEET_TRY_ASSIGN(doors_.http, OpenHttp(config_.http, config_.control.socket));
+  FOCALFLEET_TRY_ASSIGN(
+      doors_.http, OpenHttp(config_.http, config_.control.socket, *layout_, status_.page.get()));
   return {};
 }
 
@@ -464,6 +420,7 @@ ShellFacts Daemon::Facts() const {
   facts.started = service_.started;
   const AlarmRegister::Counts alarms = alarms_.Count(WallTime::Now());
   facts.alarms = {alarms.open, alarms.muted, alarms.worst ? Name(*alarms.worst) : ""};
+  facts.page = PageAddress(config_.http);
   facts.store_path = config_.store.path;
   facts.store_failing = stored_.writer->failing();
   facts.batches_waiting = stored_.writer->waiting();

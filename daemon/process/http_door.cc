@@ -11,6 +11,7 @@
 #include "daemon/access/token.h"
 #include "daemon/clock/wall_time.h"
 #include "daemon/http/api_routes.h"
+#include "daemon/page/page_routes.h"
 
 namespace focalfleet {
 namespace {
@@ -52,8 +53,18 @@ Status CheckHttpDoor(const DaemonConfig::Http& http) {
   return {};
 }
 
+std::string PageAddress(const DaemonConfig::Http& http) {
+  if (http.port == 0) return "";
+  const bool is_v6 = http.address.find(':') != std::string::npos;
+  // A certificate is for a name.
+  const std::string address = is_v6 ? "[" + http.address + "]" : http.address;
+  const std::string& host = http.tls() && !http.names.empty() ? http.names.front() : address;
+  return (http.tls() ? "https://" : "http://") + host + ":" + std::to_string(http.port) + "/";
+}
+
 Result<std::unique_ptr<HttpServer>> OpenHttp(const DaemonConfig::Http& http,
-                                             const std::string& socket) {
+                                             const std::string& socket, const Layout& layout,
+                                             PlateFeed* feed) {
   if (http.port == 0) return std::unique_ptr<HttpServer>();
   FOCALFLEET_TRY(CheckTokens(http));
   std::shared_ptr<TlsContext> tls;
@@ -64,8 +75,10 @@ Result<std::unique_ptr<HttpServer>> OpenHttp(const DaemonConfig::Http& http,
   auto router = std::make_shared<HttpRouter>(HttpRouter::Options{
       .tokens = std::make_shared<TokenRegister>(TokenRegister::Options{.path = http.tokens}),
       .tls = http.tls(),
+      .viewer_without_token = http.viewer_without_token,
       .log = [log](const std::string& text) { (*log)(text); }});
   AddApiRoutes(socket, router.get());
+  AddPageRoutes(&layout, feed, router.get());
   std::vector<std::string> names = http.names;
   names.push_back(http.address);
   return std::make_unique<HttpServer>(
@@ -74,12 +87,14 @@ Result<std::unique_ptr<HttpServer>> OpenHttp(const DaemonConfig::Http& http,
                           .names = std::move(names),
                           .router = std::move(router),
                           .tls = std::move(tls),
-                          .tell = [](const std::string& trouble) {
-                            if (trouble.empty())
-                              spdlog::info("HTTP is served again");
-                            else
-                              spdlog::warn("no HTTP, it is tried again: {}", trouble);
-                          }});
+                          .tell =
+                              [](const std::string& trouble) {
+                                if (trouble.empty())
+                                  spdlog::info("HTTP is served again");
+                                else
+                                  spdlog::warn("no HTTP, it is tried again: {}", trouble);
+                              },
+                          .limits = {.streams = http.viewers_max}});
 }
 
 }  // namespace focalfleet

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "daemon/http/http_server.h"
+#include "daemon/page/plate_feed.h"
 #include "daemon/process/config.h"
 #include "protocol/base/result.h"
 
@@ -15,9 +16,13 @@ namespace focalfleet {
 /// there is no token. Errors: kInvalid, kUnavailable name the file, or the line of the key.
 Status CheckHttpDoor(const DaemonConfig::Http& http);
 
+/// The address under which a browser finds the page; empty where there is no port.
+std::string PageAddress(const DaemonConfig::Http& http);
+
 /// The server listens, or tries to; null where there is no port. `socket` is the control socket's
-/// path. Errors: as CheckHttpDoor.
+/// path. Lifetime: layout and feed outlive the server. Errors: as CheckHttpDoor.
 Result<std::unique_ptr<HttpServer>> OpenHttp(const DaemonConfig::Http& http,
-                                             const std::string& socket);
+                                             const std::string& socket, const Layout& layout,
+                                             PlateFeed* feed);
 
 }  // namespace focalfleet

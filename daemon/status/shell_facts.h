@@ -29,6 +29,7 @@ struct ShellFacts {
   std::string version;
   WallTime started;
   Alarms alarms;
+  std::string page;  // address of the operators' page; empty: there is no HTTP door
   std::string store_path;
   bool store_failing = false;
   std::size_t batches_waiting = 0;

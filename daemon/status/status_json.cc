@@ -225,6 +225,7 @@ Json StatusJson(const FleetView& view, const ShellFacts& facts) {
   return {{"version", facts.version},
           {"time", ToIso8601(view.at)},
           {"started", ToIso8601(facts.started)},
+          {"page", facts.page.empty() ? Json() : Json(facts.page)},
           {"units", view.layout->size()},
           {"enabled", counts.enabled},
           {"phases", std::move(phases)},

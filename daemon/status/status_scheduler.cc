@@ -40,6 +40,7 @@ StatusBatch StatusScheduler::Take(const FleetView& view, std::uint64_t after_bat
       .store_failing = store_failing,
   };
   batch.configuration = ConfigurationProgressValue{view.at, view.coordinator->configuration()};
+  batch.makespan_s = MakespanSoFar(view);
   next_ = view.now + period_;
   next_idle_ = view.now + idle_period_;
   return batch;

@@ -12,6 +12,7 @@ import math
 import os
 import pathlib
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -31,6 +32,9 @@ CONFIGURATION = """
 units = "units.csv"
 [control]
 socket = "control.sock"
+[http]
+port = {port}
+tokens = "tokens.csv"
 [dds]
 domain = {domain}
 [log]
@@ -369,6 +373,7 @@ def fail(s):
     s.ask("apply targets.csv --dry-run", exits=(0, 1, 3))
     s.until(lambda: s.seen("alarms").get("open", 0) > 0, "alarms are open")
     s.ask("access")
+    s.ask("page")
     s.ask("audit --limit 5")
     s.ask("audit --verify")
     tokens = ("--file", "tokens.csv")
@@ -404,6 +409,12 @@ def simulation_answers(s):
         s.take(name, s.simulation(*line.split()), "focalfleet-sim " + line)
 
 
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
 def run(s, slow):
     domain = os.getpid() % 200 + 20
     s.domain = str(domain)
@@ -411,7 +422,8 @@ def run(s, slow):
     hall(s)
     if slow:
         s.ask("reproduce --out claims")
-    pathlib.Path("focalfleet.toml").write_text(CONFIGURATION.format(domain=domain))
+    pathlib.Path("focalfleet.toml").write_text(CONFIGURATION.format(domain=domain, port=free_port()))
+    s.ask("token add first --role viewer --days 30", "--file", "tokens.csv", command="token add")
     os.makedirs("sockets")
     os.makedirs("camera")
     os.environ["FOCALFLEET_SOCKET"] = "control.sock"

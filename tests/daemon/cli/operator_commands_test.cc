@@ -121,6 +121,16 @@ TEST_F(DaemonCommands, StatusCountsOpenAlarmsAndNamesTheNextStep) {
   EXPECT_THAT(text.out, ::testing::EndsWith("\nnext: focalfleet home 7,9 --wait\n"));
 }
 
+TEST_F(DaemonCommands, PageShowsItsAddressWhereThereIsOne) {
+  Json status = StatusAnswer();
+  status["page"] = "http://127.0.0.1:8080/";
+  EXPECT_EQ(Ask({"page"}, {{"status", {.result = status}}}).out, "http://127.0.0.1:8080/\n");
+  status["page"] = nullptr;
+  const auto none = Ask({"page"}, {{"status", {.result = status}}});
+  EXPECT_EQ(none.exit, 1);
+  EXPECT_THAT(none.err, HasSubstr("give [http] a port"));
+}
+
 TEST_F(DaemonCommands, EventsAskForAPeriodUnitsAndASeverity) {
   const Json event{{"at", "2026-11-26T20:00:00.000Z"},
                    {"severity", "warning"},

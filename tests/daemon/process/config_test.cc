@@ -70,6 +70,7 @@ names = ["plate"]
 certificate = "p.crt"
 key = "p.key"
 tokens = "t.csv"
+viewers_max = 5
 [log]
 level = "debug"
 file = "l.log"
@@ -126,6 +127,7 @@ spread = "real"
   EXPECT_EQ(config->http.certificate, "/etc/ff/p.crt");
   EXPECT_EQ(config->http.key, "/etc/ff/p.key");
   EXPECT_EQ(config->http.tokens, "/etc/ff/t.csv");
+  EXPECT_EQ(config->http.viewers_max, 5u);
   EXPECT_EQ(config->bus.opener, "/etc/ff/o.sock");
   EXPECT_EQ(config->dds.domain, 7u);
   EXPECT_EQ(config->metrics.address, "::1");
@@ -142,12 +144,12 @@ spread = "real"
   EXPECT_EQ(config->simulated.seed, 8u);
   EXPECT_FALSE(config->log.journal);
   EXPECT_EQ(config->store.keep_days, 400u);
-  EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:29");
-  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:41");
+  EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:30");
+  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:42");
   EXPECT_EQ(config->sync.chip, "/dev/gpiochip3");
   EXPECT_EQ(config->sync.line, 9u);
   EXPECT_TRUE(config->sync.active_low);
-  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:44");
+  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:45");
   EXPECT_TRUE(config->timing.sync_line);
   EXPECT_EQ(config->timing.sync_lead, Milliseconds(9));
 }
@@ -162,6 +164,11 @@ TEST(Config, HttpFromElsewhereTakesTlsAndTokens) {
         << address;
   EXPECT_THAT(ErrorOf(bus + "port = 8080\nkey = \"k\"\n"), HasSubstr("belong together"));
   EXPECT_THAT(ErrorOf(bus + "port = 8080\ntokens = \"\"\n"), HasSubstr("http.tokens"));
+  EXPECT_FALSE(ParseConfig(kMinimal, "f.toml")->http.viewer_without_token) << "off";
+  EXPECT_TRUE(ParseConfig(bus + "port = 8080\nviewer_without_token = true\n", "f.toml"));
+  EXPECT_THAT(ErrorOf(bus + "port = 8080\naddress = \"192.0.2.1\"\ncertificate = \"c\"\nkey = "
+                            "\"k\"\nviewer_without_token = true\n"),
+              HasSubstr("viewer_without_token needs a loopback address"));
   EXPECT_THAT(ErrorOf(bus + "address = \"localhost\"\n"), HasSubstr("numeric"));
 }
 

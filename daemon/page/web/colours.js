@@ -1,0 +1,105 @@
+// What a unit's colour says. Each theme maps every unit to an index of its table, and the legend
+// shows the table. Colours differ in lightness, too, so that they are told apart without hue; in the
+// near view shapes say the same (near.js).
+
+import {kPhases, kWitnesses} from "/page/frames.js";
+
+const P = Object.fromEntries(kPhases.map((name, code) => [name, code]));
+
+/** The states of a unit as the legend has them. Later ones are drawn on top. */
+export const kStates = [
+  {name: "ready", text: "stands"},
+  {name: "arrived", text: "at its target"},
+  {name: "preparing", text: "is being made ready"},
+  {name: "moving", text: "moves"},
+  {name: "unserved", text: "target not served"},
+  {name: "lost", text: "place not known"},
+  {name: "silent", text: "not heard"},
+  {name: "fault", text: "fault"},
+  {name: "disabled", text: "disabled: an obstacle"},
+];
+export const State = Object.fromEntries(kStates.map((state, index) => [state.name, index]));
+
+export function stateOf(fleet, u) {
+  if (!fleet.enabled[u]) return State.disabled;
+  const phase = fleet.phase[u];
+  if (phase === P.fault) return State.fault;
+  if (phase === P.absent || phase === P.silent || phase === P.foreign) return State.silent;
+  if (phase === P.moving || phase === P.homing || phase === P.settling) return State.moving;
+  if (phase >= P.staging && phase <= P.armed) return State.preparing;
+  if (fleet.witness[u] <= 1) return State.lost;
+  if (phase === P.identifying) return State.silent;
+  const outcome = fleet.outcome[u];  // frames.js, kOutcomes
+  if (outcome >= 3) return State.unserved;
+  return outcome === 2 ? State.arrived : State.ready;
+}
+
+const kErrorLimits_um = [5, 10, 20, 50, 100];
+const kAgeLimits_s = [1, 5, 30, 120, 600];
+
+function classOf(value, limits) {
+  let index = 0;
+  while (index < limits.length && value > limits[index]) ++index;
+  return index;
+}
+
+function classTexts(limits, unit) {
+  return [...limits.map((limit) => `up to ${limit} ${unit}`), `above ${limits.at(-1)} ${unit}`];
+}
+
+/** Colours that many groups share: group k has colour k, modulo their number. */
+const kSeries = ["s0", "s1", "s2", "s3", "s4", "s5", "s6"];
+
+function groups(fleet, column, noun) {
+  const values = [...new Set(column)].sort((a, b) => a - b);
+  const indexOf = new Map(values.map((value, index) => [value, index]));
+  return {
+    entries: values.map((value, index) => ({colour: kSeries[index % kSeries.length],
+      text: `${noun} ${value}`})),
+    indexOf: (u) => indexOf.get(column[u]),
+  };
+}
+
+/** The themes, by name: {title, entries: [{colour, text}], indexOf(u)}. */
+export function makeThemes(fleet, now_ms) {
+  const scale = (limits, unit, of, none) => ({
+    entries: [...classTexts(limits, unit).map((text, k) => ({colour: `q${k}`, text})),
+      {colour: "none", text: none}],
+    indexOf: (u) => {
+      const value = of(u);
+      return Number.isNaN(value) ? limits.length + 1 : classOf(value, limits);
+    },
+  });
+  return {
+    state: {title: "State", entries: kStates.map(({name, text}) => ({colour: name, text})),
+      indexOf: (u) => stateOf(fleet, u)},
+    error: {title: "Distance from target",
+      ...scale(kErrorLimits_um, "µm", (u) => fleet.error_um[u], "no target, or it moves")},
+    known: {title: "How its place is known",
+      entries: kWitnesses.map((text, k) => ({colour: ["none", "q4", "q2", "q1", "q0"][k], text})),
+      indexOf: (u) => fleet.witness[u]},
+    age: {title: "Last change",
+      ...scale(kAgeLimits_s, "s ago", (u) => (now_ms() - fleet.changed_ms[u]) / 1000,
+          "not since this page began")},
+    bus: {title: "Bus", ...groups(fleet, fleet.bus, "bus")},
+    rail: {title: "Power rail", ...groups(fleet, fleet.rail, "rail")},
+  };
+}
+
+const kNames = ["paper", "plate", "ink", "muted", "grid", "link", "obstacle", "pair", "none",
+  ...kStates.map(({name}) => name), ...kSeries, "q0", "q1", "q2", "q3", "q4", "q5"];
+
+/** Colours by name from the style sheet, which follow light and dark; `of32` for an ImageData. */
+export function readColours(element) {
+  const style = getComputedStyle(element);
+  const colours = {};
+  const of32 = {};
+  for (const name of kNames) {
+    const text = style.getPropertyValue(`--${name}`).trim();
+    const hex = text.length === 4 ? text.replace(/[0-9a-f]/gi, "$&$&") : text;
+    const value = parseInt(hex.slice(1), 16);
+    colours[name] = hex;
+    of32[name] = (0xFF000000 | (value & 0xFF) << 16 | (value & 0xFF00) | value >> 16) >>> 0;
+  }
+  return {...colours, of32};
+}

@@ -1,0 +1,234 @@
+// A configuration from file to result: preview, apply, progress, and what came of it.
+
+import {counted, duration, find, make, micrometres, setText} from "/page/dom.js";
+
+const kFileBytesMax = 12 << 20;
+const kUnservedShown = 8;
+const kWorstShown = 8;
+
+/** Reasons with their counts, the commonest first. */
+function byReason(rows) {
+  const counts = new Map();
+  for (const {reason, outcome} of rows) {
+    const text = (reason || outcome).replace(/ by unit \d+$/, " by another unit");
+    counts.set(text, (counts.get(text) ?? 0) + 1);
+  }
+  return [...counts].sort((a, b) => b[1] - a[1]);
+}
+
+export class Configuration {
+  constructor(api, access, plate, onUnit) {
+    Object.assign(this, {api, access, plate, onUnit});
+    this.facts = null;
+    this.file = null;
+    this.resultOf = "";  // the configuration whose result is shown
+    find("choose-file").addEventListener("click", () => find("file").click());
+    find("file").addEventListener("change", () => {
+      const [file] = find("file").files;
+      find("file").value = "";
+      if (file) this.take(file);
+    });
+    this.acceptDrops();
+  }
+
+  acceptDrops() {
+    let depth = 0;
+    const show = (on) => { find("drop").hidden = !on; };
+    window.addEventListener("dragenter", (event) => {
+      event.preventDefault();
+      show(++depth > 0);
+    });
+    window.addEventListener("dragleave", () => show(--depth > 0));
+    window.addEventListener("dragover", (event) => event.preventDefault());
+    window.addEventListener("drop", (event) => {
+      event.preventDefault();
+      depth = 0;
+      show(false);
+      const [file] = event.dataTransfer.files;
+      if (file) this.take(file);
+    });
+  }
+
+  say(...children) {
+    find("preview").replaceChildren(...children);
+  }
+
+  clear() {
+    this.file = null;
+    this.plate.marked = [];
+    this.plate.dirty = true;
+    this.say();
+  }
+
+  // ---- preview
+
+  async take(file) {
+    if (!this.access.may("preview")) {
+      this.say(make("p", {class: "trouble", role: "alert"},
+          `A preview takes the role operator; you are ${this.access.role}.`));
+      return;
+    }
+    if (file.size > kFileBytesMax) {
+      this.say(make("p", {class: "trouble", role: "alert"}, `${file.name} is larger than 12 MB.`));
+      return;
+    }
+    this.file = {source: file.name, targets_csv: await file.text()};
+    this.say(make("p", {}, `${file.name}: a way is being planned. Nothing moves …`));
+    try {
+      this.show(await this.api.ask("preview", this.file));
+    } catch (error) {
+      this.say(make("p", {class: "trouble", role: "alert"}, `${error.message}`),
+          this.dismissButton());
+    }
+  }
+
+  dismissButton() {
+    return make("p", {class: "buttons"},
+        make("button", {type: "button", onclick: () => this.clear()}, "Close"));
+  }
+
+  unitButton(id) {
+    return make("button", {type: "button", class: "row-button", onclick: () => this.onUnit(id)},
+        String(id));
+  }
+
+  show(preview) {
+    const {fleet} = this.plate;
+    this.plate.marked = preview.unserved.map(({unit_id}) => fleet.placeOf.get(unit_id))
+      .filter((u) => u !== undefined);
+    this.plate.dirty = true;
+    const not = preview.unserved.length;
+    const corrections = make("select", {"aria-label": "Corrections by the camera"},
+        ...[["not measured", ""], ["measured", "0"], ["1 correction", "1"], ["2 corrections", "2"],
+          ["3 corrections", "3"]].map(([text, value]) => make("option", {value}, text)));
+    const apply = this.access.guard(make("button", {type: "button", class: "main", id: "apply",
+      onclick: () => this.apply(apply, corrections.value)},
+    `Move ${counted(preview.moving, "unit")}`), "apply");
+    this.say(make("h3", {}, `Preview of ${this.file.source}`), make("dl", {},
+        make("dt", {}, "served"), make("dd", {}, `${preview.served.toLocaleString("en")} of ` +
+            counted(preview.targeted, "target")),
+        make("dt", {}, "takes"), make("dd", {}, duration(preview.makespan_s)),
+        make("dt", {}, "power"), make("dd", {}, `at most ${preview.peak_power_W.toFixed(0)} W`)),
+    ...(not === 0 ? [] : [make("p", {}, `${counted(not, "target")} not served, marked on the plate:`),
+      make("ul", {}, ...byReason(preview.unserved).map(([reason, count]) =>
+        make("li", {}, `${count}: ${reason}`))),
+      make("p", {}, ...preview.unserved.slice(0, kUnservedShown).flatMap(({unit_id}) =>
+        [this.unitButton(unit_id), " "]), not > kUnservedShown ? "…" : "")]),
+    make("p", {class: "buttons"}, apply, corrections,
+        make("button", {type: "button", onclick: () => this.clear()}, "Discard")),
+    make("p", {class: "trouble", id: "apply-trouble", role: "alert"}));
+  }
+
+  async apply(button, corrections) {
+    button.disabled = true;
+    const args = corrections === "" ? this.file
+      : {...this.file, corrections: Number(corrections)};
+    try {
+      await this.api.ask("apply", args);
+      this.clear();
+    } catch (error) {
+      setText(find("apply-trouble"), error.message);
+      button.disabled = false;
+    }
+  }
+
+  // ---- progress and result
+
+  note(facts) {
+    this.facts = facts;
+    const c = facts.configuration;
+    const over = !facts.busy;
+    this.showProgress();
+    const key = `${c.id} ${c.state} ${over}`;
+    if (over && c.id > 0 && key !== this.resultOf) {
+      this.resultOf = key;
+      this.showResult(c);
+    } else if (!over) {
+      this.resultOf = "";
+      this.showUnderWay(c);
+    }
+  }
+
+  showProgress() {
+    const {configuration: c, busy} = this.facts;
+    const bar = find("progress");
+    if (!busy) {
+      setText(find("progress-text"), c.id === 0 ? "No configuration was applied yet."
+        : `Configuration ${c.id} is ${c.state}.`);
+      bar.value = c.id !== 0 && c.state === "done" ? 1 : 0;
+      return;
+    }
+    const late_s = c.makespan_s - c.makespan_predicted_s;
+    let text = `Configuration ${c.id}: ${c.state}`;
+    if (c.makespan_predicted_s > 0 && late_s <= 0)
+      text += `, ${duration(Math.max(0, -late_s))} to its planned end`;
+    else if (c.makespan_predicted_s > 0) text += `, ${duration(late_s)} behind its plan`;
+    setText(find("progress-text"), text);
+    const arrived = c.targeted > 0 ? c.arrived / c.targeted : 0;
+    const passed = c.makespan_predicted_s > 0
+      ? Math.min(0.99, c.makespan_s / c.makespan_predicted_s) : 0;
+    bar.value = Math.max(arrived, passed);
+  }
+
+  showUnderWay(c) {
+    find("configuration").replaceChildren(make("p", {}, make("b", {}, c.source || c.kind), " ",
+        `is under way: ${c.arrived} of ${counted(c.targeted, "unit")} there` +
+        (c.round > 1 ? `, round ${c.round}` : "") + "."),
+    ...(c.waiting_for ? [make("p", {class: "hint"}, `It waits for ${c.waiting_for}.`)] : []),
+    ...this.measuredRows(c));
+  }
+
+  measuredRows(c) {
+    const rows = c.measured.map((round, k) => make("tr", {},
+        make("td", {}, k === 0 ? "first" : `after correction ${k}`),
+        make("td", {}, micrometres(round.median_um ?? NaN)),
+        make("td", {}, micrometres(round.worst_um ?? NaN)),
+        make("td", {}, `${round.within_tolerance} of ${round.measured}`)));
+    if (rows.length === 0) return [];
+    return [make("table", {}, make("thead", {}, make("tr", {},
+        ...["measured", "median", "worst", "within"].map((text) =>
+          make("th", {scope: "col"}, text)))), make("tbody", {}, ...rows))];
+  }
+
+  async showResult(c) {
+    const parts = [["refused", c.refused], ["failed", c.failed], ["stopped", c.stopped],
+      ["not confirmed", c.unmeasured]].filter(([, count]) => count > 0)
+      .map(([text, count]) => `${count} ${text}`);
+    const all = c.targeted > 0 && c.arrived === c.targeted;
+    const element = find("configuration");
+    element.replaceChildren(make("p", {}, make("b", {}, c.source || c.kind),
+        ` (configuration ${c.id}) is ${c.state}.`),
+    make("p", {class: all ? "good" : ""}, `${c.arrived} of ${counted(c.targeted, "unit")} arrived` +
+        (parts.length > 0 ? `; ${parts.join(", ")}.` : ".")),
+    ...(c.makespan_s > 0 ? [make("p", {class: "hint"}, `It took ${duration(c.makespan_s)}, planned ` +
+        `${duration(c.makespan_predicted_s)}.`)] : []),
+    ...this.measuredRows(c),
+    ...(c.not_measured ? [make("p", {class: "trouble"}, `Not measured: ${c.not_measured}`)] : []),
+    ...this.worstRows());
+    if (parts.length > 0) await this.addUnserved(element, c.id);
+  }
+
+  worstRows() {
+    const {fleet} = this.plate;
+    const worst = this.plate.worst(kWorstShown).filter((u) => fleet.error_um[u] >= 1);
+    if (worst.length === 0) return [];
+    return [make("h3", {}, "Farthest from their targets"), make("table", {}, make("tbody", {},
+        ...worst.map((u) => make("tr", {}, make("td", {}, this.unitButton(fleet.id[u])),
+            make("td", {}, micrometres(fleet.error_um[u]))))))];
+  }
+
+  async addUnserved(element, id) {
+    let status;
+    try {
+      status = await this.api.ask("status");
+    } catch {
+      return;
+    }
+    const {unserved} = status.configuration;
+    if (status.configuration.id !== id || unserved.length === 0) return;
+    element.append(make("h3", {}, "Not served"), make("ul", {}, ...byReason(unserved)
+      .slice(0, kUnservedShown).map(([reason, count]) => make("li", {}, `${count}: ${reason}`))),
+    make("p", {}, ...unserved.slice(0, kUnservedShown).flatMap(({unit_id}) =>
+      [this.unitButton(unit_id), " "])));
+  }
+}

@@ -1,0 +1,37 @@
+// The runbook's own words about an alarm, from the file that the daemon was built with.
+
+import {make} from "/page/dom.js";
+
+let sections = null;
+
+/** The sections of the runbook by their headings. */
+async function load() {
+  const text = await (await fetch("/page/runbook.md")).text();
+  const found = new Map();
+  for (const part of text.split(/^### /m).slice(1)) {
+    const [name, ...lines] = part.split("\n");
+    found.set(name.trim(), lines.join("\n").split(/^## /m)[0]);
+  }
+  return found;
+}
+
+/** Texts between backquotes are code; links are their words. */
+function proseOf(text) {
+  const plain = text.replace(/\[([^\]]*)\]\([^)]*\)/g, "$1").replace(/\s+/g, " ").trim();
+  return plain.split("`").map((part, k) => k % 2 === 1 ? make("code", {}, part) : part);
+}
+
+/** What the runbook has about the alarm, as elements. */
+export async function runbookOf(name) {
+  sections ??= load();
+  let text;
+  try {
+    text = (await sections).get(name);
+  } catch {
+    sections = null;
+  }
+  if (!text) return [make("p", {class: "hint"}, "The runbook has no entry for it.")];
+  const [prose, ...items] = text.split(/^- /m);
+  return [make("p", {}, ...proseOf(prose)),
+    make("ul", {class: "runbook"}, ...items.map((item) => make("li", {}, ...proseOf(item))))];
+}

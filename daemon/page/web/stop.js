@@ -1,0 +1,34 @@
+// Stop: one press sends it, without a question. Each press sends it again.
+
+import {find, setText} from "/page/dom.js";
+
+export class Stop {
+  constructor(api, access) {
+    this.api = api;
+    this.access = access;
+    this.sent = 0;
+    find("stop").addEventListener("click", () => this.send());
+    window.addEventListener("keydown", (event) => {
+      const typing = event.target.matches?.("input, select, textarea");
+      if (event.shiftKey && event.code === "KeyS" && !event.ctrlKey && !event.metaKey && !typing) {
+        event.preventDefault();
+        this.send();
+      }
+    });
+  }
+
+  async send() {
+    const number = ++this.sent;
+    const say = (text) => {
+      if (number === this.sent) setText(find("stop-state"), text);
+    };
+    say("Stop is sent …");
+    try {
+      await this.api.ask("stop");
+      say(`Stop: the daemon has it (${new Date().toISOString().slice(11, 19)} UTC).`);
+    } catch (error) {
+      say(`NOT STOPPED: ${error.message}. At the host: focalfleet stop --direct`);
+      if (error.status === 401) this.access.open("Stop needs a token: any role may stop.");
+    }
+  }
+}

@@ -1,0 +1,60 @@
+#include "daemon/process/status_output.h"
+
+#include <utility>
+
+#include "daemon/usage/build_version.h"
+
+namespace focalfleet {
+namespace {
+
+void OpenPublisher(const DaemonConfig::Dds& dds, StatusOutput* out) {
+  DdsTroubles* const troubles = out->troubles.get();
+  out->publisher = std::make_unique<RenewingStatusPublisher>(RenewingStatusPublisher::Options{
+      .join = {.join = [options = DdsOptionsOf(dds)] { return StatusPublisher::Create(options); },
+               .tell =
+                   [troubles](const std::string& trouble) {
+                     troubles->Report(AlarmName::kDdsMissing, "status", trouble);
+                   }},
+      .renews = !dds.security.empty()});
+  out->credentials =
+      WatchCredentials(dds, troubles, [publisher = out->publisher.get()] { publisher->Renew(); });
+}
+
+}  // namespace
+
+void OpenStatusOutput(const DaemonConfig& config, const Layout& layout, WallTime started,
+                      const HostClock& clock, StatusOutput* out) {
+  if (config.dds.enabled || config.camera.dds) WarnOfDdsEnvironment(config.dds);
+  if (config.dds.enabled) OpenPublisher(config.dds, out);
+  if (config.http.port != 0)
+    out->page = std::make_unique<PlateFeed>(
+        PlateFeed::Options{.layout = &layout, .viewers_max = config.http.viewers_max});
+  if (out->publisher == nullptr && out->page == nullptr) return;
+  out->scheduler = std::make_unique<StatusScheduler>(
+      layout.size(),
+      StatusScheduler::Options{
+          .rate_hz = config.dds.rate_hz, .version = BuildVersion(), .started = started},
+      clock);
+}
+
+Status StartStatusThread(std::function<void()> room, std::function<void()> alive,
+                         StatusOutput* out) {
+  if (out->scheduler == nullptr) return {};
+  RenewingStatusPublisher* const publisher = out->publisher.get();
+  PlateFeed* const page = out->page.get();
+  StatusThread::Sinks sinks;
+  sinks.publish = [publisher, page](const StatusBatch& status) {
+    if (page != nullptr) page->Take(status);
+    return publisher != nullptr && publisher->Publish(status);
+  };
+  sinks.alarm = [publisher, page](const AlarmValue& alarm) {
+    if (page != nullptr) page->NoteAlarm();
+    if (publisher != nullptr) publisher->Publish(alarm);
+  };
+  sinks.room = std::move(room);
+  sinks.alive = std::move(alive);
+  FOCALFLEET_TRY_ASSIGN(out->thread, StatusThread::Create(std::move(sinks)));
+  return {};
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,97 @@
+// A browser with the page in it, and what every scenario needs of it.
+
+import {createRequire} from "node:module";
+import {createInterface} from "node:readline";
+import assert from "node:assert/strict";
+
+const given = JSON.parse(process.argv[2]);
+const require = createRequire(`${given.nodeFolder}/`);
+const {chromium} = require("playwright-core");
+const kPatience_ms = 60_000;  // limit for a hang; nothing is timed
+
+const answers = createInterface({input: process.stdin})[Symbol.asyncIterator]();
+
+/** The test's world does something (page_test.py). */
+export async function world(what) {
+  process.stdout.write(`@${what}\n`);
+  const {value} = await answers.next();
+  assert.equal(value, "done");
+}
+
+export async function withBrowser(use) {
+  const browser = await chromium.launch({executablePath: "/usr/bin/chromium",
+    args: ["--disable-gpu", "--no-sandbox"]});
+  try {
+    return await use(browser);
+  } finally {
+    await browser.close();
+  }
+}
+
+/** A tab; faults of its scripts, and what its policy forbids, fail the test. */
+export async function openTab(browser, options = {}) {
+  const context = await browser.newContext({viewport: {width: 1400, height: 900}, ...options});
+  const tab = await context.newPage();
+  tab.setDefaultTimeout(kPatience_ms);
+  tab.faults = [];
+  tab.on("pageerror", (error) => tab.faults.push(String(error)));
+  tab.on("console", (message) => {
+    // A refusal is an answer, and a broken link is the point of a scenario.
+    const expected = /Failed to load resource|ERR_(CONNECTION|INCOMPLETE|EMPTY)/;
+    if (message.type() === "error" && !expected.test(message.text()))
+      tab.faults.push(message.text());
+  });
+  await tab.goto(given.url);
+  return tab;
+}
+
+export async function signIn(tab, role) {
+  if (!await tab.locator("#token-dialog").isVisible()) await tab.click("#sign-in");
+  await tab.fill("#token", given.tokens[role]);
+  await tab.click("#token-form button[type=submit]");
+  await tab.locator("#role", {hasText: role}).waitFor();
+}
+
+export async function isLive(tab) {
+  await tab.locator("#link", {hasText: /^live$/}).waitFor();
+}
+
+export async function textOf(tab, selector, pattern) {
+  const found = tab.locator(selector, {hasText: pattern});
+  await found.waitFor();
+  return found.innerText();
+}
+
+/** The file is dropped onto the page, as from a folder. */
+export async function dropFile(tab, name, text) {
+  const data = await tab.evaluateHandle(([fileName, content]) => {
+    const transfer = new DataTransfer();
+    transfer.items.add(new File([content], fileName, {type: "text/csv"}));
+    return transfer;
+  }, [name, text]);
+  for (const event of ["dragenter", "dragover", "drop"])
+    await tab.dispatchEvent("body", event, {dataTransfer: data});
+}
+
+/** Pixels of the canvas that are not its background, by colour, the commonest first. */
+export async function coloursOf(tab) {
+  return tab.evaluate(() => {
+    const canvas = document.getElementById("plate");
+    const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    const pixels = new Uint32Array(data.buffer);
+    const counts = new Map();
+    for (const pixel of pixels) counts.set(pixel, (counts.get(pixel) ?? 0) + 1);
+    return [...counts].sort((a, b) => b[1] - a[1]);
+  });
+}
+
+export async function axeFindings(tab) {
+  await tab.evaluate(require("node:fs").readFileSync(require.resolve("axe-core/axe.min.js"), "utf8"));
+  return tab.evaluate(async () => {
+    const {violations} = await window.axe.run();
+    return violations.filter(({impact}) => impact === "serious" || impact === "critical")
+      .map(({id, nodes}) => `${id}: ${nodes.map(({target}) => target).join(" | ")}`);
+  });
+}
+
+export {assert, given};

@@ -1,0 +1,173 @@
+// The scenarios of page_test.py.
+
+import {readFileSync} from "node:fs";
+import {assert, axeFindings, coloursOf, dropFile, given, isLive, openTab, signIn, textOf,
+  withBrowser, world} from "./browser.mjs";
+
+const targets = () => readFileSync(given.targets, "utf8");
+const say = (text) => process.stdout.write(`${text}\n`);
+
+/** Verbs that the tab sent, oldest first. */
+function watchVerbs(tab) {
+  const sent = [];
+  tab.on("request", (request) => {
+    const at = new URL(request.url()).pathname;
+    if (at.startsWith("/api/")) sent.push(at.slice(5));
+  });
+  return sent;
+}
+
+async function night(browser) {
+  say("nobody looks on without a token");
+  const tab = await openTab(browser);
+  await textOf(tab, "#link", "signed out");
+  const sent = watchVerbs(tab);
+
+  say("a wrong token is refused, with the daemon's words");
+  await tab.fill("#token", "fft_wrong");
+  await tab.press("#token", "Enter");
+  await textOf(tab, "#token-reason", "the token is not valid");
+
+  say("a viewer looks on, and cannot move anything");
+  await signIn(tab, "viewer");
+  await isLive(tab);
+  await textOf(tab, "#fleet-summary", `${given.count} units: ${given.count} ready`);
+  await dropFile(tab, "targets.csv", targets());
+  await textOf(tab, "#preview", "takes the role operator; you are viewer");
+  assert.deepEqual(sent.filter((verb) => verb === "preview" || verb === "apply"), []);
+
+  say("stop: one press, one request; pressing again sends it again");
+  sent.length = 0;
+  await tab.click("#stop");
+  await textOf(tab, "#stop-state", "the daemon has it");
+  await tab.keyboard.press("Shift+S");
+  await tab.waitForFunction(() => window.focalfleetPage.stop.sent === 2);
+  await textOf(tab, "#stop-state", "the daemon has it");
+  assert.equal(sent.filter((verb) => verb === "stop").length, 2);
+
+  say("an operator drops a file: preview, apply, progress, result");
+  await signIn(tab, "operator");
+  await dropFile(tab, "night-1.csv", targets());
+  await textOf(tab, "#preview", "Preview of night-1.csv");
+  await textOf(tab, "#preview", `of ${given.count} targets`);
+  await tab.screenshot({path: `${given.out}/preview.png`});
+  assert.ok(!sent.includes("apply"), "a preview applies nothing");
+  await tab.click("#apply");
+  await textOf(tab, "#configuration", /night-1.csv is under way/);
+  await textOf(tab, "#progress-text", /planned end|behind its plan|staging|planning/);
+  await textOf(tab, "#configuration", /night-1.csv \(configuration 1\) is done/);
+  await textOf(tab, "#configuration", `${given.count} units arrived`);
+  const arrived = await tab.evaluate(() => window.focalfleetPage.fleet.outcome.every((o) => o === 2));
+  assert.ok(arrived, "each unit is at its target on the plate, too");
+
+  say("a stop during motion");
+  await world("targets 7");
+  await dropFile(tab, "night-2.csv", targets());
+  await tab.click("#apply");
+  await textOf(tab, "#fleet-summary", /moving/);
+  await tab.waitForFunction((count) => {  // the legend counts what moves, too
+    const entries = [...document.querySelectorAll("#legend li")].map(({textContent}) => textContent);
+    return Number.parseInt(entries.find((text) => text.endsWith("moves")), 10) > count / 2;
+  }, given.count);
+  await tab.screenshot({path: `${given.out}/moving.png`});
+  await tab.click("#stop");
+  await textOf(tab, "#configuration", /stopped/);
+  await tab.screenshot({path: `${given.out}/stopped.png`});
+
+  say("a unit: arms, knowledge, moves newest first");
+  await tab.fill("#find-id", "7");
+  await tab.press("#find-id", "Enter");
+  await textOf(tab, "#unit tbody", /arrived/);
+  assert.match(await tab.locator("#unit").innerText(), /theta[\s\S]*phi[\s\S]*node/);
+
+  say("what happened, newest first");
+  await tab.click("#events summary");
+  await textOf(tab, "#events-list", /night-2.csv.*is stopped/);
+
+  say("an alarm: the runbook's words, mute with a reason, acknowledge");
+  await tab.click("#sound");
+  await world("fault 9");
+  const alarm = tab.locator("#alarms li", {hasText: "unit"}).first();
+  await alarm.waitFor();
+  assert.match(await tab.title(), /^\(\d+\) focalfleet$/);
+  assert.equal(await tab.evaluate(() => window.focalfleetPage.alarms.sound.played), 2,
+      "a tone when it was turned on, and one for the alarm");
+  await alarm.locator("summary").click();
+  await alarm.locator(".runbook li").first().waitFor();
+  assert.match(await alarm.innerText(), /Do:/);
+  await tab.screenshot({path: `${given.out}/alarm.png`});
+  await alarm.getByRole("button", {name: "Mute"}).click();
+  await textOf(tab, "#alarms", "Give a reason");
+  const open = await tab.locator("#alarms li").count();
+  await alarm.getByRole("button", {name: "Acknowledge"}).click();
+  await tab.waitForFunction((before) =>
+    document.querySelectorAll("#alarms > li").length < before, open);
+  assert.ok(sent.includes("alarms_ack"));
+
+  say("the daemon ends: the page says so, keeps what it has, and comes back by a snapshot");
+  const numberBefore = await tab.evaluate(() => window.focalfleetPage.fleet.number);
+  await world("stop-daemon");
+  await textOf(tab, "#link", "no link");
+  await textOf(tab, "#stale", /Old: the plate as it was/);
+  assert.ok(await tab.evaluate(() => window.focalfleetPage.plate.isStale));
+  await tab.click("#stop");
+  await textOf(tab, "#stop-state", "NOT STOPPED");
+  await tab.screenshot({path: `${given.out}/stale.png`});
+  await world("start-daemon");
+  await isLive(tab);
+  assert.ok(await tab.locator("#stale").isHidden());
+  const numberAfter = await tab.evaluate(() => window.focalfleetPage.fleet.number);
+  assert.ok(numberAfter < numberBefore, "the frames of the new daemon begin anew");
+
+  say("a revoked token ends the stream");
+  await world("revoke operator-page");
+  await textOf(tab, "#link", "signed out");
+  assert.deepEqual(tab.faults, []);
+}
+
+const kSizes = [["desktop", 1400, 900], ["tablet", 768, 1024], ["phone", 390, 844]];
+
+async function looks(browser) {
+  for (const colorScheme of ["light", "dark"]) {
+    for (const [name, width, height] of kSizes) {
+      const tab = await openTab(browser, {viewport: {width, height}, colorScheme});
+      await signIn(tab, "operator");
+      await isLive(tab);
+      await tab.waitForFunction(() => window.focalfleetPage.plate.times_ms.length > 2);
+      const colours = await coloursOf(tab);
+      const [[background, empty]] = colours;
+      const drawn = colours.reduce((sum, [, count]) => sum + count, 0) - empty;
+      say(`${name} ${colorScheme}: ${drawn} pixels drawn on ${background.toString(16)}`);
+      assert.ok(drawn > 5 * given.count, "each unit has pixels");
+      const stop = await tab.locator("#stop").boundingBox();
+      assert.ok(stop.height >= 56 && stop.width >= 56 && stop.x >= 0 &&
+        stop.y + stop.height <= height, `stop is in view: ${JSON.stringify(stop)}`);
+      assert.deepEqual(await axeFindings(tab), []);
+      await tab.screenshot({path: `${given.out}/${name}-${colorScheme}.png`});
+      if (name === "desktop") await closer(tab, colorScheme);
+      assert.deepEqual(tab.faults, []);
+      await tab.context().close();
+    }
+  }
+}
+
+/** Pictures of the near view, a preview, and other colours. */
+async function closer(tab, colorScheme) {
+  await tab.fill("#find-id", "2500");
+  await tab.press("#find-id", "Enter");
+  await textOf(tab, "#unit", "theta");
+  await tab.screenshot({path: `${given.out}/near-${colorScheme}.png`});
+  assert.deepEqual(await axeFindings(tab), []);
+  await tab.keyboard.press("Escape");
+  await tab.click("#zoom-all");
+  await tab.selectOption("#theme", "bus");
+  await dropFile(tab, "targets.csv", targets());
+  await textOf(tab, "#preview", "Preview of targets.csv");
+  assert.deepEqual(await axeFindings(tab), []);
+  await tab.screenshot({path: `${given.out}/preview-${colorScheme}.png`});
+}
+
+const scenarios = {night, looks};
+await withBrowser((browser) => scenarios[given.scenario](browser));
+say("done");
+process.exit(0);
