@@ -156,6 +156,12 @@ async function closer(tab, colorScheme) {
   await tab.fill("#find-id", "2500");
   await tab.press("#find-id", "Enter");
   await textOf(tab, "#unit", "theta");
+  const [bar_mm, drawn_mm] = await tab.evaluate(() => {
+    const bar = document.querySelector("#scale");
+    return [Number.parseFloat(bar.lastElementChild.textContent),
+      bar.firstElementChild.getBoundingClientRect().width / window.focalfleetPage.plate.view.scale];
+  });
+  assert.ok(Math.abs(drawn_mm - bar_mm) < 0.01 * bar_mm, `a bar of ${drawn_mm} mm says ${bar_mm}`);
   await tab.screenshot({path: `${given.out}/near-${colorScheme}.png`});
   assert.deepEqual(await axeFindings(tab), []);
   await tab.keyboard.press("Escape");

@@ -69,7 +69,7 @@ class Page {
     this.fleet = new Fleet(layout);
     this.plate = new Plate(find("plate"), this.fleet);
     const showUnit = (id) => this.unit.showId(id);
-    this.unit = new UnitPanel(this.api, this.plate, () => {});
+    this.unit = new UnitPanel(this.api, this.plate, () => this.showScale());
     this.alarms = new Alarms(this.api, this.access, showUnit);
     this.configuration = new Configuration(this.api, this.access, this.plate, showUnit);
     this.events = new Events(this.api);

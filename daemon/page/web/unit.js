@@ -18,10 +18,10 @@ function point(x, y) {
 }
 
 export class UnitPanel {
-  constructor(api, plate, onSelect) {
+  constructor(api, plate, onView) {
     this.api = api;
     this.plate = plate;
-    this.onSelect = onSelect;
+    this.onView = onView;
     this.place = -1;
     this.list = make("dl");
     this.history = make("div");
@@ -41,6 +41,7 @@ export class UnitPanel {
     setText(find("find-trouble"), place === undefined ? `There is no unit ${id}.` : "");
     if (place === undefined) return;
     this.plate.view.showUnit(place);
+    this.onView();
     this.select(place);
   }
 
@@ -63,7 +64,6 @@ export class UnitPanel {
     this.list.replaceChildren();
     this.refresh();
     this.page(null);
-    this.onSelect(place);
   }
 
   async refresh() {
