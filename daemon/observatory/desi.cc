@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "fleet/files/cell.h"
@@ -95,7 +96,8 @@ std::string ReasonOf(CsvRow* row) {
 /// Rows of one robot at several times: the newest counts. Shape: (rows); false: another one does.
 std::vector<bool> Newest(const CsvTable& table, const std::string& name) {
   std::vector<bool> newest(table.size(), true);
-  const auto time_column = table.Find("time_recorded");
+  const std::string time = FirstColumnOf(table, {"time_recorded", "time"});
+  const auto time_column = table.Find(time);
   const auto name_column = table.Find(name);
   if (!time_column || !name_column) return newest;
   std::unordered_map<std::string, std::pair<std::size_t, double>> best;
@@ -171,11 +173,15 @@ Status TakeDesiState(const std::vector<NamedTable>& tables, Plate* plate) {
     const std::string key = FirstColumnOf(table, {"pos_id", "location"});
     if (key.empty()) FOCALFLEET_TRY(table.Require({"pos_id"}));
     const std::vector<bool> newest = Newest(table, key);
+    std::unordered_set<std::uint32_t> taken;
     FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
       if (!newest[row.at()]) return;
       PlateUnit* unit = UnitOfRow(&row, plate);
       if (unit == nullptr)
         return LeaveOut(each, row.at(), row.Text(key), "state", "not in the layout", plate);
+      if (!taken.insert(unit->unit.id.value).second)
+        return row.RejectRow(unit->name + " is there twice, and no time tells which row counts",
+                             "a robot twice");
       const std::int64_t bits = row.IntegerIfAny("state", {0, 1 << 20}).value_or(0);
       for (const StateBit& known : kStateBits)
         if ((bits & known.bit) != 0) Disable(unit, known.reason);
@@ -214,6 +220,9 @@ Status TakeDesiTargets(const std::vector<NamedTable>& tables, Plate* plate) {
     const auto y = row.NumberInIfAny("fiberassign_y", "mm");
     if (row.error()) return;
     const bool is_assigned = row.NumberIfAny("targetid").value_or(0) >= 0;
+    if (is_assigned && row.Text("targetid").find_first_not_of("0123456789") != std::string::npos)
+      return row.Reject("targetid", Quoted(row.Text("targetid")) +
+                                        " is no whole number: was it written as a fraction?");
     if (!is_assigned) return leave(unit->name, "no target is assigned (TARGETID below 0)");
     if (!x || !y) return leave(unit->name, "it has no place");
     if (!row_of.emplace(unit->unit.id.value, row.at()).second)

@@ -272,8 +272,10 @@ Result<std::size_t> ExportSdss(const ExportRequest& request) {
   FOCALFLEET_TRY_ASSIGN(const Rows rows, ReadRows(request, "sdss"));
   constexpr int kNone = -999;
   std::string text = kConfSummaryHead;
+  const bool says_which = std::ranges::any_of(
+      rows, [](const auto& each) { return !each.second.Id("fiberType").empty(); });
   for (const auto& [id, row] : rows) {
-    const std::string assigned = row.Id("fiberType").empty() ? "BOSS" : row.Id("fiberType");
+    const std::string assigned = says_which ? row.Id("fiberType") : "BOSS";
     for (const FibreOfRobot& fibre : kFibres) {
       if (row.Id(fibre.x).empty() || row.Id(fibre.y).empty()) continue;
       PointFp place{kNone, kNone};

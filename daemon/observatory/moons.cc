@@ -21,11 +21,20 @@ PointFp PlaceOf(double r_mm, double theta_deg) {
   return {r_mm * std::sin(theta_deg * kRad), r_mm * std::cos(theta_deg * kRad)};
 }
 
+/// A number at the end of a file that was cut short would be taken for another.
+Result<std::string> ReadWholeLines(const std::string& path) {
+  FOCALFLEET_TRY_ASSIGN(std::string text, ReadTextFile(path));
+  if (text.empty() || text.ends_with('\n')) return text;
+  return Fail(ErrorCode::kInvalid, path +
+                                       ": the last line does not end: the file is cut short "
+                                       "(or end it with a newline)");
+}
+
 /// A parameter file: keys with their values and lines.
 class MoonsParameters {
  public:
   static Result<MoonsParameters> Read(const std::string& path) {
-    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
+    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadWholeLines(path));
     MoonsParameters parameters;
     parameters.file_ = path;
     std::string_view rest = text;
@@ -51,6 +60,15 @@ class MoonsParameters {
     return Fail(ErrorCode::kInvalid, file_ + ":" + std::to_string(found->second.line) + ": key " +
                                          key + ": " + Quoted(found->second.text) +
                                          " is not a number");
+  }
+  /// `otherwise` where the key is not there.
+  [[nodiscard]] Result<bool> Flag(const std::string& key, bool otherwise) const {
+    const auto found = values_.find(key);
+    if (found == values_.end()) return otherwise;
+    if (const auto flag = ParseFlagWord(found->second.text)) return *flag;
+    return Fail(ErrorCode::kInvalid, file_ + ":" + std::to_string(found->second.line) + ": key " +
+                                         key + ": " + Quoted(found->second.text) +
+                                         " is neither T nor F");
   }
   [[nodiscard]] int Line(const std::string& key) const {
     const auto found = values_.find(key);
@@ -140,8 +158,10 @@ Status TakeUnit(const MoonsParameters& parameters, std::uint32_t number, const U
   }
   for (const char* key : {"COLUMN", "ROW"})
     if (parameters.Has(stem + "." + key)) unit.ids[key] = parameters.Text(stem + "." + key);
-  if (parameters.Text(stem + ".LOCK") == "T") Disable(&unit, "locked");
-  if (parameters.Text(fibre + ".HEALTH") == "F") Disable(&unit, "fibre broken");
+  FOCALFLEET_TRY_ASSIGN(const bool is_locked, parameters.Flag(stem + ".LOCK", false));
+  if (is_locked) Disable(&unit, "locked");
+  FOCALFLEET_TRY_ASSIGN(const bool is_healthy, parameters.Flag(fibre + ".HEALTH", true));
+  if (!is_healthy) Disable(&unit, "fibre broken");
   const auto fail = [&](const std::string& reason) {
     return Fail(ErrorCode::kInvalid, parameters.file() + ":" +
                                          std::to_string(parameters.Line(stem + ".RFOCAL")) +
@@ -193,7 +213,7 @@ Status TakeMoonsLayout(const std::string& file, const SourceFiles& files, Plate*
 
 /// The lines of targets as a table with a header; both forms become `unit r theta parity priority`.
 Result<NamedTable> ReadTargetLines(const std::string& path, const Plate& plate) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadWholeLines(path));
   std::string csv = "unit,r,theta,parity,priority\n";
   std::string_view rest = text;
   std::size_t row = 0;

@@ -113,7 +113,7 @@ Status TakeFibreMap(const std::vector<NamedTable>& tables, Plate* plate) {
       const std::string text = std::to_string(fibre);
       unit->ids["fiberId"] = text;
       if (!plate->index
-               .emplace("fiberId=" + text, plate->index.at("unit_id=" + row.Text("cobraId")))
+               .emplace("fiberId=" + text, plate->index.at("unit_id=" + std::to_string(*cobra)))
                .second)
         row.Reject("fiberId", text + " is there twice");
     }));
@@ -121,18 +121,42 @@ Status TakeFibreMap(const std::vector<NamedTable>& tables, Plate* plate) {
   return {};
 }
 
+/// An angle of a motor: radians, unless the table declares another unit.
+std::optional<double> MotorAngle_deg(CsvRow* row, const CsvTable& table, const std::string& name) {
+  const auto column = table.Find(name);
+  if (column && !table.declared_unit(*column).empty()) return row->NumberInIfAny(name, "deg");
+  const auto angle_rad = row->NumberIfAny(name);
+  return angle_rad ? std::optional(*angle_rad * kDegPerRad) : std::nullopt;
+}
+
+/// The latest row of a cobra by visit and iteration counts.
 Status TakePfsState(const std::vector<NamedTable>& tables, Plate* plate) {
+  using Order = std::pair<std::int64_t, std::int64_t>;
+  std::unordered_map<std::uint32_t, std::optional<Order>> taken;
   for (const NamedTable& each : tables) {
     FOCALFLEET_TRY(each.table.Require({"cobra_id", "motor_target_theta", "motor_target_phi"}));
+    const bool has_order =
+        each.table.Find("pfs_visit_id").has_value() && each.table.Find("iteration").has_value();
     FOCALFLEET_TRY(each.table.ReadRows([&](CsvRow& row) {
-      PlateUnit* unit = plate->Find(
-          UnitId{static_cast<std::uint32_t>(row.Integer("cobra_id", {0, UINT32_MAX - 1}))});
+      const auto cobra = static_cast<std::uint32_t>(row.Integer("cobra_id", {0, UINT32_MAX - 1}));
+      PlateUnit* unit = plate->Find(UnitId{cobra});
       if (unit == nullptr)
         return LeaveOut(each, row.at(), row.Text("cobra_id"), "state", "not in the layout", plate);
-      const auto theta_rad = row.NumberIfAny("motor_target_theta");
-      const auto phi_rad = row.NumberIfAny("motor_target_phi");
-      if (theta_rad && phi_rad)  // the last row of a cobra counts
-        unit->stands = AnglesDeg{*theta_rad * kDegPerRad, *phi_rad * kDegPerRad};
+      const auto theta = MotorAngle_deg(&row, each.table, "motor_target_theta");
+      const auto phi = MotorAngle_deg(&row, each.table, "motor_target_phi");
+      std::optional<Order> order;
+      if (has_order)
+        order = Order{row.Integer("pfs_visit_id", {0, INT64_MAX}),
+                      row.Integer("iteration", {0, INT64_MAX})};
+      if (row.error() || !theta || !phi) return;
+      const auto [before, fresh] = taken.try_emplace(cobra, order);
+      if (!fresh && (!order || !before->second || *order == *before->second))
+        return row.RejectRow("cobra " + row.Text("cobra_id") +
+                                 " is there twice, and no visit and iteration tell which counts",
+                             "a cobra twice");
+      if (!fresh && *order < *before->second) return;
+      before->second = order;
+      unit->stands = AnglesDeg{*theta, *phi};
     }));
   }
   return {};
@@ -246,13 +270,12 @@ Status TakeMoves(const std::vector<NamedTable>& tables, Plate* plate) {
   std::map<Key, Sent> moves;
   FOCALFLEET_TRY(sent->table.ReadRows([&](CsvRow& row) {
     const Key key = KeyOf(&row);
-    const auto theta_rad = row.NumberIfAny("motor_target_theta");
-    const auto phi_rad = row.NumberIfAny("motor_target_phi");
+    const auto theta = MotorAngle_deg(&row, sent->table, "motor_target_theta");
+    const auto phi = MotorAngle_deg(&row, sent->table, "motor_target_phi");
     if (row.error()) return;
-    if (!theta_rad || !phi_rad)
+    if (!theta || !phi)
       return LeaveOut(*sent, row.at(), row.Text("cobra_id"), "move", "no angles", plate);
-    if (!moves.emplace(key, Sent{row.at(), {*theta_rad * kDegPerRad, *phi_rad * kDegPerRad}})
-             .second)
+    if (!moves.emplace(key, Sent{row.at(), {*theta, *phi}}).second)
       row.RejectRow("cobra " + row.Text("cobra_id") + " has this visit and iteration twice",
                     "a move twice");
   }));

@@ -103,6 +103,28 @@ std::optional<SourceTable> TableOfNamedObjects(const Json& object) {
   return std::move(rows).Take("");
 }
 
+/// The byte, from 1, at which values are nested deeper than any table is; 0: nowhere. The parser
+/// and the values' text go as deep as the file does.
+std::size_t TooDeepAt(std::string_view text) {
+  constexpr std::size_t kDepthMost = 64;
+  std::size_t depth = 0;
+  bool in_string = false;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    if (in_string) {
+      if (c == '\\') ++at;
+      if (c == '"') in_string = false;
+    } else if (c == '"') {
+      in_string = true;
+    } else if (c == '[' || c == '{') {
+      if (++depth > kDepthMost) return at + 1;
+    } else if ((c == ']' || c == '}') && depth > 0) {
+      --depth;
+    }
+  }
+  return 0;
+}
+
 std::vector<SourceTable> TablesOf(const Json& root) {
   if (IsListOf(root, &Json::is_object)) return {TableOfObjects(root, "")};
   if (!root.is_object()) return {};
@@ -126,11 +148,15 @@ std::vector<SourceTable> TablesOf(const Json& root) {
 Result<SourceFile> ReadJsonSource(std::string_view text, const std::string& name) {
   std::string reason;
   Json root;
+  if (const std::size_t deep = TooDeepAt(text); deep != 0)
+    return Fail(ErrorCode::kInvalid, name + ": nested too deep, byte " + std::to_string(deep));
   // The only way to learn where it is wrong is the exception.
   try {
     root = Json::parse(text);
   } catch (const Json::parse_error& error) {
     reason = "not JSON, byte " + std::to_string(error.byte);
+  } catch (const Json::out_of_range& error) {
+    reason = "a number that no column can hold";
   }
   if (!reason.empty()) return Fail(ErrorCode::kInvalid, name + ": " + reason);
   SourceFile file{.format = "a JSON file", .tables = TablesOf(root)};

@@ -61,7 +61,9 @@ class TreeBuilder {
     TreeBuilder& self = Of(data);
     if (self.open_.size() >= kDepthMax) return self.Stop("elements are nested too deep");
     auto element = std::make_unique<Element>();
-    element->name = name;
+    const std::string_view local = std::string_view(name).substr(
+        std::string_view(name).find_last_of(':') + 1);  // without its namespace's prefix
+    element->name = local;
     element->line = static_cast<int>(XML_GetCurrentLineNumber(self.parser_));
     for (; attributes[0] != nullptr; attributes += 2)
       element->attributes.emplace_back(attributes[0], attributes[1]);
@@ -129,64 +131,92 @@ SourceTable TableOfElements(const std::vector<const Element*>& elements) {
 using Group = std::vector<const Element*>;
 
 /// The children with attributes or children of their own, by name.
-std::vector<Group> GroupsOf(const Element& parent) {
+std::vector<Group> GroupsOf(const Group& parents) {
   std::vector<Group> groups;
-  for (const auto& child : parent.children) {
-    if (child->children.empty() && child->attributes.empty()) continue;
-    const auto same = std::ranges::find_if(
-        groups, [&](const Group& group) { return group.front()->name == child->name; });
-    if (same == groups.end())
-      groups.push_back({child.get()});
-    else
-      same->push_back(child.get());
+  for (const Element* parent : parents) {
+    for (const auto& child : parent->children) {
+      if (child->children.empty() && child->attributes.empty()) continue;
+      const auto same = std::ranges::find_if(
+          groups, [&](const Group& group) { return group.front()->name == child->name; });
+      if (same == groups.end())
+        groups.push_back({child.get()});
+      else
+        same->push_back(child.get());
+    }
   }
   return groups;
 }
 
 bool HasRepeats(const Element& element) {
-  return std::ranges::any_of(GroupsOf(element), [](const Group& group) {
+  return std::ranges::any_of(GroupsOf({&element}), [](const Group& group) {
     return group.size() > 1 || HasRepeats(*group.front());
   });
 }
 
-/// The tables below `parent`: of elements of one name that occur twice. An element that occurs once
-/// is searched for such ones, else it is a row itself.
-void AddTables(const Element& parent, std::vector<SourceTable>* tables) {
-  for (const Group& group : GroupsOf(parent)) {
-    if (group.size() == 1 && HasRepeats(*group.front())) {
-      AddTables(*group.front(), tables);
+/// The tables below `parents`: of elements of one name that occur twice. Elements that hold such
+/// ones are no rows but lists of them, of which there may be several.
+void AddTables(const Group& parents, std::vector<SourceTable>* tables) {
+  for (const Group& group : GroupsOf(parents)) {
+    if (std::ranges::any_of(group, [](const Element* each) { return HasRepeats(*each); })) {
+      AddTables(group, tables);
     } else {
       tables->push_back(TableOfElements(group));
     }
   }
 }
 
-void AddVoTables(const Element& element, std::vector<SourceTable>* tables) {
+/// The text that stands for no value in a FIELD's column; empty where none does.
+std::string NullOf(const Element& field) {
+  for (const auto& child : field.children)
+    if (const std::string* null = child->Attribute("null"); child->name == "VALUES" && null)
+      return *null;
+  return {};
+}
+
+Status AddVoTables(const Element& element, const std::string& file,
+                   std::vector<SourceTable>* tables) {
   if (element.name != "TABLE") {
-    for (const auto& child : element.children) AddVoTables(*child, tables);
-    return;
+    for (const auto& child : element.children) FOCALFLEET_TRY(AddVoTables(*child, file, tables));
+    return {};
   }
+  const auto fail = [&](const Element& at, const std::string& reason) {
+    return Fail(ErrorCode::kInvalid, file + ":" + std::to_string(at.line) + ": " + reason);
+  };
   SourceTable table;
   if (const std::string* name = element.Attribute("name")) table.name = *name;
   table.header_place = element.line;
   std::vector<std::vector<std::string>> columns;
+  std::vector<std::string> nulls;
   for (const auto& child : element.children) {
     if (child->name != "FIELD") continue;
+    nulls.push_back(NullOf(*child));
     const std::string* name = child->Attribute("name");
     const std::string* unit = child->Attribute("unit");
     table.columns.push_back({name != nullptr ? *name : "", unit != nullptr ? *unit : "", {}});
     columns.emplace_back();
   }
-  for (const auto& data : element.children)
-    for (const auto& form : data->children)
+  for (const auto& data : element.children) {
+    if (data->name != "DATA") continue;
+    for (const auto& form : data->children) {
+      if (form->name != "TABLEDATA")
+        return fail(*form, "a VOTable in " + form->name + " is not read: write it as TABLEDATA");
       for (const auto& row : form->children) {
-        if (form->name != "TABLEDATA" || row->name != "TR") continue;
-        for (std::size_t k = 0; k < columns.size(); ++k)
-          columns[k].push_back(k < row->children.size() ? TrimmedText(row->children[k]->text) : "");
+        if (row->name != "TR") continue;
+        if (row->children.size() > columns.size())
+          return fail(*row, std::to_string(row->children.size()) + " cells for " +
+                                std::to_string(columns.size()) + " columns");
+        for (std::size_t k = 0; k < columns.size(); ++k) {
+          std::string cell =
+              k < row->children.size() ? TrimmedText(row->children[k]->text) : std::string();
+          columns[k].push_back(cell == nulls[k] ? std::string() : std::move(cell));
+        }
         table.places.push_back(row->line);
       }
+    }
+  }
   for (std::size_t k = 0; k < columns.size(); ++k) table.columns[k].values = std::move(columns[k]);
   if (!table.columns.empty()) tables->push_back(std::move(table));
+  return {};
 }
 
 }  // namespace
@@ -196,9 +226,9 @@ Result<SourceFile> ReadXmlSource(const std::string& text, const std::string& nam
   SourceFile file{.format = "an XML file", .tables = {}};
   if (root->name == "VOTABLE") {
     file.format = "a VOTable";
-    AddVoTables(*root, &file.tables);
+    FOCALFLEET_TRY(AddVoTables(*root, name, &file.tables));
   } else {
-    AddTables(*root, &file.tables);
+    AddTables({root.get()}, &file.tables);
     for (SourceTable& table : file.tables)
       for (const auto& child : root->children)
         if (child->children.empty()) table.keys.emplace_back(child->name, TrimmedText(child->text));

@@ -158,6 +158,8 @@ def broken_files():
         "moons": [("positioners.cfg", "INS.POS2.RFOCAL  ", "INS.POS2.RFOCAL  x", ["positioners.cfg:",
                    "key INS.POS2.RFOCAL: 'x"]),
                   ("targets.txt", " L ", " Q ", ["targets.txt:", "column parity: 'Q' is neither L nor R"]),
+                  ("positioners.cfg", 'LOCK    "F"', 'LOCK    "Fault"', ["LOCK: 'Fault' is neither T nor F"]),
+                  ("positioners.cfg", 'HEALTH  "T"', 'HEALTH  "BROKEN"', ["'BROKEN' is neither T nor F"]),
                   ("positioners.cfg", "INS.POS.LENGTH2", "INS.POS.LENGTHX",
                    ["key INS.POS.LENGTH2 is missing"])]}
     for name, old, new, reasons in cases[PROJECT]:
@@ -174,6 +176,43 @@ def broken_files():
             check(name, reason in done.stderr, f"'{reason}' is not in: {done.stderr}")
         check(name, not pathlib.Path("none").exists(), "a folder was made")
         pathlib.Path(name).write_text(good)
+
+
+def state_by(file):
+    """state.csv of an import with this file of states."""
+    words = import_command()
+    words[words.index("--out") + 1] = "by_state"
+    if "--state" in words:
+        words[words.index("--state") + 1] = file
+    else:
+        words += ["--state", file]
+    done = run(words)
+    check(file, done.returncode == 0, done.stderr)
+    return pathlib.Path("by_state/state.csv").read_text() if done.returncode == 0 else ""
+
+
+def the_latest_state_counts():
+    """The order of the rows says nothing, and declared units of angles count."""
+    if PROJECT == "pfs":
+        table = Table.read("cobra_move.csv")
+        wanted = state_by("cobra_move.csv")
+        table[::-1].write("reversed.csv")
+        check("state", state_by("reversed.csv") == wanted, "rows in another order")
+        for name in ("motor_target_theta", "motor_target_phi"):
+            table[name] = [math.degrees(angle) for angle in table[name]]
+            table[name].unit = "deg"
+        table.write("degrees.ecsv")
+        degrees = [(r["unit_id"], round(float(r["theta_deg"]), 6), round(float(r["phi_deg"]), 6))
+                   for r in csv.DictReader(state_by("degrees.ecsv").splitlines())]
+        check("state", degrees == [(r["unit_id"], round(float(r["theta_deg"]), 6), round(float(r["phi_deg"]), 6))
+                                   for r in csv.DictReader(wanted.splitlines())], "declared degrees")
+    if PROJECT == "desi":
+        pathlib.Path("log.csv").write_text(
+            "LOCATION,TIME,STATE,POS_T,POS_P\n1001,2026-01-01T00:00:00,0,2,151\n"
+            "1001,2025-01-01T00:00:00,2,1,150\n")
+        state_by("log.csv")
+        left = rows("by_state/state.csv")
+        check("state", any((r["theta_deg"], r["phi_deg"]) == ("2", "151") for r in left), "the latest row")
 
 
 def fibres_go_out():
@@ -205,6 +244,7 @@ def main():
         the_page()
         if not WRONG:
             broken_files()
+            the_latest_state_counts()
             fibres_go_out()
     for wrong in WRONG:
         print(wrong)

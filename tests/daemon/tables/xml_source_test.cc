@@ -36,6 +36,16 @@ TEST(XmlSource, RepeatedElementsAreRowsAndWhatStandsBelowAreCells) {
   EXPECT_EQ(second.line(), 6);
 }
 
+TEST(XmlSource, ListsOfOneNameAreOneTable) {
+  const auto file = ReadXmlSource(
+      "<R><ring><o><Id>1</Id></o><o><Id>2</Id></o></ring><ring><o><Id>3</Id></o></ring></R>",
+      "a.xml");
+  ASSERT_TRUE(file) << file.error().text;
+  ASSERT_EQ(file->tables.size(), 1u);
+  EXPECT_EQ(file->tables[0].name, "o");
+  EXPECT_THAT(file->tables[0].columns[0].values, ::testing::ElementsAre("1", "2", "3"));
+}
+
 TEST(XmlSource, ASingleElementIsARow) {
   const auto file = ReadXmlSource("<R><ROW><H><Id>1</Id></H><B><x>2</x></B></ROW></R>", "a.xml");
   ASSERT_TRUE(file);
@@ -58,7 +68,24 @@ TEST(XmlSource, VoTablesHaveUnits) {
   EXPECT_EQ(row.line(), 4);
 }
 
+TEST(XmlSource, VoTablesHaveNullsAndPrefixes) {
+  const auto file = ReadXmlSource(
+      "<v:VOTABLE><v:TABLE><v:FIELD name=\"n\"><v:VALUES null=\"0\"/></v:FIELD>"
+      "<v:DATA><v:TABLEDATA><v:TR><v:TD>0</v:TD></v:TR><v:TR><v:TD>7</v:TD></v:TR>"
+      "</v:TABLEDATA></v:DATA></v:TABLE></v:VOTABLE>",
+      "a.vot");
+  ASSERT_TRUE(file) << file.error().text;
+  EXPECT_THAT(file->tables[0].columns[0].values, ::testing::ElementsAre("", "7"));
+}
+
 TEST(XmlSource, RefusesWithLineAndReason) {
+  const auto of_form = [](const std::string& form) {
+    return "<VOTABLE><TABLE><FIELD name=\"n\"/>\n<DATA>" + form + "</DATA></TABLE></VOTABLE>";
+  };
+  EXPECT_THAT(ErrorOf(of_form("<BINARY2><STREAM>AAAA</STREAM></BINARY2>")),
+              HasSubstr("a.xml:2: a VOTable in BINARY2 is not read"));
+  EXPECT_THAT(ErrorOf(of_form("<TABLEDATA><TR><TD>1</TD><TD>2</TD></TR></TABLEDATA>")),
+              HasSubstr("a.xml:2: 2 cells for 1 columns"));
   EXPECT_THAT(ErrorOf("<a>\n<b>\n</a>"), HasSubstr("a.xml:3: mismatched tag"));
   EXPECT_THAT(ErrorOf("<a><b>1</b></a>"), HasSubstr("no table in this XML file"));
   EXPECT_THAT(ErrorOf("<!DOCTYPE a [<!ENTITY b \"cc\">]>\n<a>&b;</a>"),
