@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <string>
+#include <variant>
+#include <vector>
+
 #include "fleet/files/csv.h"
 
 namespace focalfleet {
@@ -13,6 +17,10 @@ using ::testing::HasSubstr;
 std::string ErrorOf(const std::string& text) {
   const auto file = ReadXmlSource(text, "a.xml");
   return file ? "" : file.error().text;
+}
+
+std::vector<std::string> FirstColumn(const SourceFile& file) {
+  return std::get<std::vector<std::string>>(file.tables.at(0).columns.at(0).values);
 }
 
 TEST(XmlSource, RepeatedElementsAreRowsAndWhatStandsBelowAreCells) {
@@ -43,7 +51,7 @@ TEST(XmlSource, ListsOfOneNameAreOneTable) {
   ASSERT_TRUE(file) << file.error().text;
   ASSERT_EQ(file->tables.size(), 1u);
   EXPECT_EQ(file->tables[0].name, "o");
-  EXPECT_THAT(file->tables[0].columns[0].values, ::testing::ElementsAre("1", "2", "3"));
+  EXPECT_THAT(FirstColumn(*file), ::testing::ElementsAre("1", "2", "3"));
 }
 
 TEST(XmlSource, ASingleElementIsARow) {
@@ -75,7 +83,7 @@ TEST(XmlSource, VoTablesHaveNullsAndPrefixes) {
       "</v:TABLEDATA></v:DATA></v:TABLE></v:VOTABLE>",
       "a.vot");
   ASSERT_TRUE(file) << file.error().text;
-  EXPECT_THAT(file->tables[0].columns[0].values, ::testing::ElementsAre("", "7"));
+  EXPECT_THAT(FirstColumn(*file), ::testing::ElementsAre("", "7"));
 }
 
 TEST(XmlSource, RefusesWithLineAndReason) {
