@@ -57,57 +57,46 @@ std::vector<UnitOffset> Offsets(const Fit& fit) {
   return offsets;
 }
 
-// A unit's rows: the places that its offset moves in each, um, and the lever of the image's turn
-// and scale.
-struct OffsetRows {
-  WhiteUnit white;
-  VectorXd moved_um;  // interleaved x, y of the used rows
-  [[nodiscard]] std::size_t ExposureOf(const Fit& fit, std::size_t k) const {
-    return fit.facts->exposures.of_row[white.track.first_row + white.moves[k]];
-  }
-  // Displacements by a shift, a turn and a scale of the image, where the row is.
-  [[nodiscard]] Eigen::Matrix<double, 2, 4> ImageAt(const Fit& fit, std::size_t k) const {
-    const std::size_t row = white.track.first_row + white.moves[k];
-    const double x = fit.facts->campaign->x_mm[row] / fit.facts->radius_mm;
-    const double y = fit.facts->campaign->y_mm[row] / fit.facts->radius_mm;
-    Eigen::Matrix<double, 2, 4> image;
-    image << 1, 0, -y, x, 0, 1, x, y;
-    return image;
-  }
-};
-
 // Where the image moves, what the offsets of all units do alike in an exposure is the image's
 // motion as well: no table has its place. Offsets are judged without it, as if by the marginal
 // likelihood of both, in which the motions of exposures do not depend on one another.
 void TakeOffTheImage(const Fit& fit, std::vector<UnitOffset>* offsets) {
-  if (fit.model.exposures.empty()) return;
-  constexpr double kUndetermined = 1e-9;  // keeps the equations of few rows determined
-  const std::size_t exposures = fit.facts->exposures.size();
-  std::vector<Eigen::Matrix4d> normal(exposures, Eigen::Matrix4d::Identity() * kUndetermined);
-  std::vector<Eigen::Vector4d> right(exposures, Eigen::Vector4d::Zero());
-  std::vector<OffsetRows> units;
-  for (const UnitOffset& one : *offsets) {
-    OffsetRows rows{Whiten(fit, one.unit), {}};
-    rows.moved_um = GeometryDisplacements(rows.white) * one.offset;
-    for (std::size_t k = 0; k < rows.white.moves.size(); ++k) {
-      const std::size_t e = rows.ExposureOf(fit, k);
-      const auto image = rows.ImageAt(fit, k);
-      const double weight = fit.weight[rows.white.track.first_row + rows.white.moves[k]];
-      normal[e] += weight * image.transpose() * image;
-      right[e] += weight * image.transpose() * rows.moved_um.segment<2>(static_cast<Index>(2 * k));
+  using ImageNormal = Eigen::Matrix<double, kExposureParameters, kExposureParameters>;
+  using ImageVector = Eigen::Matrix<double, kExposureParameters, 1>;
+  const std::vector<ExposureTerm>& exposures = fit.model.exposures;
+  std::vector<ImageNormal> normal(exposures.size(), ImageNormal::Zero());
+  std::vector<ImageVector> image(exposures.size(), ImageVector::Zero());
+  // Calls `each` with every row whose image moves: the row's index in `white`, its exposure, and
+  // the image's displacements.
+  const auto for_rows = [&](const WhiteUnit& white, const auto& each) {
+    for (std::size_t k = 0; k < white.moves.size(); ++k) {
+      const std::size_t e = fit.facts->exposures.of_row[white.track.first_row + white.moves[k]];
+      if (exposures[e].moves())
+        each(static_cast<Index>(2 * k), e, ImageDisplacements(white, k, fit.facts->radius_mm));
     }
-    units.push_back(std::move(rows));
+  };
+  if (std::ranges::none_of(exposures, &ExposureTerm::moves)) return;
+  for (const UnitOffset& one : *offsets) {
+    const WhiteUnit white = Whiten(fit, one.unit);
+    const VectorXd moved_um = GeometryDisplacements(white) * one.offset;
+    for_rows(white, [&](Index at, std::size_t e, const auto& displacements) {
+      const Eigen::Matrix2d root = white.filter[static_cast<std::size_t>(at / 2)].root();
+      const Eigen::Matrix<double, 2, kExposureParameters> rows = root * displacements;
+      normal[e] += rows.transpose() * rows;
+      image[e] += rows.transpose() * (root * moved_um.segment<2>(at));
+    });
   }
-  for (std::size_t e = 0; e < exposures; ++e) right[e] = normal[e].ldlt().solve(right[e]).eval();
-  for (std::size_t u = 0; u < units.size(); ++u) {
-    const OffsetRows& rows = units[u];
-    VectorXd image_um(rows.moved_um.size());
-    for (std::size_t k = 0; k < rows.white.moves.size(); ++k)
-      image_um.segment<2>(static_cast<Index>(2 * k)) =
-          rows.ImageAt(fit, k) * right[rows.ExposureOf(fit, k)];
-    rows.white.Apply(image_um.data());
-    UnitOffset& one = (*offsets)[u];
-    one.offset -= one.covariance * (rows.white.geometry.transpose() * image_um);
+  // An exposure of few rows leaves some of the motion open: the least motion that fits.
+  for (std::size_t e = 0; e < exposures.size(); ++e)
+    image[e] = normal[e].completeOrthogonalDecomposition().solve(image[e]).eval();
+  for (UnitOffset& one : *offsets) {
+    const WhiteUnit white = Whiten(fit, one.unit);
+    VectorXd image_um = VectorXd::Zero(white.y.size());
+    for_rows(white, [&](Index at, std::size_t e, const auto& displacements) {
+      image_um.segment<2>(at) = displacements * image[e];
+    });
+    white.Apply(image_um.data());
+    one.offset -= one.covariance * (white.geometry.transpose() * image_um);
   }
 }
 

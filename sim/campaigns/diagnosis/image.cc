@@ -42,12 +42,10 @@ std::vector<Image> Normals(const Fit& fit) {
       // Displacement per um of shift, and per um at the plate's edge of turn, scale and shears.
       const double x = white.track.fibre_x_mm[i] / fit.facts->radius_mm;
       const double y = white.track.fibre_y_mm[i] / fit.facts->radius_mm;
-      const double* w = white.filter[k].w;
-      Eigen::Matrix<double, 2, 6> plain, j;
-      plain << 1, 0, -y, x, x, y, 0, 1, x, y, -y, x;
-      Eigen::Matrix2d root;
-      root << w[0], w[1], w[1], w[2];
-      j = root * plain;
+      Eigen::Matrix<double, 2, 6> plain;
+      plain << ImageDisplacements(white, k, fit.facts->radius_mm),
+          (Eigen::Matrix2d() << x, y, -y, x).finished();
+      const Eigen::Matrix<double, 2, 6> j = white.filter[k].root() * plain;
       image.normal += j.transpose() * j;
       const Eigen::Vector2d residual = white.y.segment<2>(static_cast<Eigen::Index>(2 * k));
       image.right += j.transpose() * residual;

@@ -55,7 +55,13 @@ struct ExposureTerm {
   double shift_y_um = 0;
   double turn_urad = 0;
   double scale_ppm = 0;
+
+  [[nodiscard]] bool moves() const {
+    return shift_x_um != 0 || shift_y_um != 0 || turn_urad != 0 || scale_ppm != 0;
+  }
 };
+/// The number of its members.
+inline constexpr int kExposureParameters = 4;
 
 /// A step of one axis at one move that stays until the unit is homed (or for that move alone).
 struct EventTerm {

@@ -235,8 +235,7 @@ void FreeHomings(Fit* fit) {
 
 double CountParameters(const Fit& fit) {
   double parameters = 2 * static_cast<double>(MovesWithEvents(fit.model));
-  constexpr double kOfImage = 4;  // shifts, scale and turn of an exposure
-  parameters += kOfImage * static_cast<double>(fit.model.exposures.size());
+  parameters += kExposureParameters * static_cast<double>(fit.model.exposures.size());
   const std::size_t freed = fit.model.homing_zero_deg[kTheta].empty() ? 0 : fit.model.units.size();
   for (std::size_t unit = 0; unit < freed; ++unit) {
     // The first zero of each axis belongs to the geometry.

@@ -117,6 +117,15 @@ std::array<double, 2> TurnAtBeginning(const UnitTrack& track, std::size_t move,
 
 }  // namespace
 
+Eigen::Matrix<double, 2, kExposureParameters> ImageDisplacements(const WhiteUnit& white,
+                                                                 std::size_t k, double radius_mm) {
+  const double x = white.track.fibre_x_mm[white.moves[k]] / radius_mm;
+  const double y = white.track.fibre_y_mm[white.moves[k]] / radius_mm;
+  Eigen::Matrix<double, 2, kExposureParameters> image;
+  image << 1, 0, -y, x, 0, 1, x, y;
+  return image;
+}
+
 Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white) {
   const UnitTrack& track = white.track;
   Eigen::MatrixXd out(static_cast<Eigen::Index>(2 * white.moves.size()), kStaticColumns);

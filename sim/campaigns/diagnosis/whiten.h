@@ -50,6 +50,10 @@ struct RowFilter {
   double w[3];                   // symmetric root of the inverse covariance: xx, xy, yy; per um
   double gain[2 * kRestErrors];  // of each rest error by x, y
   double keep[3];                // of theta, phi, place, since the used row before
+
+  [[nodiscard]] Eigen::Matrix2d root() const {
+    return (Eigen::Matrix2d() << w[0], w[1], w[1], w[2]).finished();
+  }
 };
 
 struct WhiteUnit {
@@ -65,8 +69,7 @@ struct WhiteUnit {
 };
 
 /// The same for the rows of a filter. Shapes: filter (n), turn_um (n, 4), xy_um (2 n).
-void ApplyFilter(std::span<const RowFilter> filter, std::span<const double> turn_um,
-                 double* xy_um);
+void ApplyFilter(std::span<const RowFilter> filter, std::span<const double> turn_um, double* xy_um);
 
 /// Degrees of freedom of Student's t in two dimensions, by which a likelihood judges a whitened
 /// place. An outlier costs the logarithm of its distance, so that its noise does not decide.
@@ -81,6 +84,11 @@ WhiteUnit Whiten(const Fit& fit, std::size_t unit);
 /// The same with all weights 1, and only y, from which the rows' weights are made. `weights` gets
 /// the Huber weight of each used row, which the filter uses as it goes.
 WhiteUnit WhitenAnew(const Fit& fit, std::size_t unit, std::vector<double>* weights);
+
+/// The displacements of a used row by a shift of the image in x and y, by its turn and by its
+/// scale: per um, and per um at the radius. Before whitening.
+Eigen::Matrix<double, 2, kExposureParameters> ImageDisplacements(const WhiteUnit& white,
+                                                                 std::size_t k, double radius_mm);
 
 /// The displacements that static geometry makes, in um per mm and degree, and that pose errors
 /// make, in um. Shapes: (2 moves, 6), (2 moves).

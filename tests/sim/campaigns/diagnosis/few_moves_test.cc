@@ -1,5 +1,6 @@
 // Where each unit was seen after few moves, the fits of the units absorb much of the noise, and an
-// exposure shows few units. The rest of the noise must not look like causes.
+// exposure shows few units. The rest of the noise must not look like causes. Of 40 such campaigns 4
+// are still given one, each of a single unit: more than the 1 % that is aimed at.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -38,7 +39,7 @@ TEST(FewMoves, ExposuresOfFewUnitsHaveTheNoiseOfAll) {
   const Fit fit = StaticFit(facts);
   for (const double factor : fit.noise.exposure_factor) {
     EXPECT_GT(factor, 0.5);
-    EXPECT_LT(factor, 2.5);
+    EXPECT_LT(factor, 2);
   }
 }
 
