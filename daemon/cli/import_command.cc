@@ -91,15 +91,20 @@ ExitCode RunImport(const Context& context, const ImportOptions& options) {
                {"targets", targets},
                {"moves", plate->moves.size()},
                {"left_out", plate->left_out.size()},
+               {"notes", plate->notes},
                {"out", options.out}});
   }
+  if (!context.quiet && !context.json)
+    for (const std::string& note : plate->notes) Complain("focalfleet: " + note + "\n");
   ReportLeftOut(context, *plate, options.out);
   Say(context,
       fmt::format("{}: {}, {} of them disabled; {}, {}, {}", options.out,
                   Count(plate->units.size(), "unit", "units"), disabled,
                   Count(targets, "target", "targets"), Count(plate->moves.size(), "move", "moves"),
                   Count(plate->obstacles.size(), "obstacle", "obstacles")));
-  return ExitCode::kOk;
+  const bool none_taken = (!options.files.targets.empty() && targets == 0) ||
+                          (!options.files.moves.empty() && plate->moves.empty());
+  return none_taken ? ExitCode::kSomeUnserved : ExitCode::kOk;
 }
 
 ExitCode RunExport(const Context& context, const ExportOptions& options) {

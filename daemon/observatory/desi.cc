@@ -288,10 +288,11 @@ MoveRow ReadMoveRow(CsvRow* row) {
 
 void AddMovesOf(const PlateUnit& unit, std::vector<MoveRow> rows, bool from_camera,
                 const NamedTable& source, Plate* plate) {
-  std::ranges::sort(rows, [](const MoveRow& a, const MoveRow& b) {
-    const bool timed = !std::isnan(a.time_s) && !std::isnan(b.time_s) && a.time_s != b.time_s;
-    return timed ? a.time_s < b.time_s : a.move < b.move;
-  });
+  // Where a single time is missing, times order nothing.
+  const bool timed =
+      std::ranges::none_of(rows, [](const MoveRow& row) { return std::isnan(row.time_s); });
+  std::ranges::sort(
+      rows, {}, [&](const MoveRow& row) { return std::pair(timed ? row.time_s : 0, row.move); });
   const MoveRow* before = nullptr;
   std::int64_t last = -1;
   for (const MoveRow& row : rows) {
@@ -364,14 +365,11 @@ Result<Plate> ReadDesi(const SourceFiles& files) {
   FOCALFLEET_TRY(TakeDesiState(state, &plate));
   DisableOutsiders(&plate);
   FOCALFLEET_TRY(TakeFiducials(files, &plate));
-  if (!files.targets.empty()) {
-    FOCALFLEET_TRY_ASSIGN(const auto targets, ReadAll(files.targets));
-    FOCALFLEET_TRY(TakeDesiTargets(targets, &plate));
-  }
-  if (!files.moves.empty()) {
-    FOCALFLEET_TRY_ASSIGN(const auto moves, ReadAll(files.moves));
-    FOCALFLEET_TRY(TakeMoves(moves, files.from_camera, &plate));
-  }
+  FOCALFLEET_TRY_ASSIGN(const auto targets, ReadAll(files.targets));
+  if (!targets.empty()) FOCALFLEET_TRY(TakeDesiTargets(targets, &plate));
+  FOCALFLEET_TRY_ASSIGN(const auto moves, ReadAll(files.moves));
+  if (!moves.empty()) FOCALFLEET_TRY(TakeMoves(moves, files.from_camera, &plate));
+  NotePassedOver({&layout, &disabled, &state, &targets, &moves}, &plate);
   return plate;
 }
 

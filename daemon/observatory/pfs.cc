@@ -336,14 +336,11 @@ Result<Plate> ReadPfs(const SourceFiles& files) {
   FOCALFLEET_TRY(TakePfsState(state, &plate));
   DisableOutsiders(&plate);
   FOCALFLEET_TRY(TakeFiducials(files, &plate));
-  if (!files.targets.empty()) {
-    FOCALFLEET_TRY_ASSIGN(const auto targets, ReadAll(files.targets));
-    FOCALFLEET_TRY(TakePfsTargets(targets, &plate));
-  }
-  if (!files.moves.empty()) {
-    FOCALFLEET_TRY_ASSIGN(const auto moves, ReadAll(files.moves));
-    FOCALFLEET_TRY(TakeMoves(moves, &plate));
-  }
+  FOCALFLEET_TRY_ASSIGN(const auto targets, ReadAll(files.targets));
+  if (!targets.empty()) FOCALFLEET_TRY(TakePfsTargets(targets, &plate));
+  FOCALFLEET_TRY_ASSIGN(const auto moves, ReadAll(files.moves));
+  if (!moves.empty()) FOCALFLEET_TRY(TakeMoves(moves, &plate));
+  NotePassedOver({&layout, &disabled, &fibres, &state, &targets, &moves}, &plate);
   return plate;
 }
 

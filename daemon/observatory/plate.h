@@ -63,7 +63,7 @@ struct Plate {
   std::optional<Targets> targets;
   std::vector<MeasuredMove> moves;
   std::vector<LeftOut> left_out;
-  std::vector<std::string> notes;  // what was assumed
+  std::vector<std::string> notes;  // what was assumed or passed over
 
   /// Null: no such unit.
   [[nodiscard]] PlateUnit* Find(UnitId id);
@@ -91,6 +91,9 @@ struct SourceFiles {
 
 /// All tables of all files, in their order. Errors: as ReadTables.
 Result<std::vector<NamedTable>> ReadAll(const std::vector<std::string>& files);
+/// Notes the columns that no reader of these tables asked for, once for all files that have the
+/// same ones, and the tables of which nothing was read. Call it when all is read.
+void NotePassedOver(std::initializer_list<const std::vector<NamedTable>*> lists, Plate* plate);
 /// The first table with all of these columns; null: none.
 const NamedTable* WithColumns(const std::vector<NamedTable>& tables,
                               std::initializer_list<std::string_view> columns);
@@ -127,7 +130,8 @@ void LeaveOut(const NamedTable& table, std::size_t row, const std::string& unit,
 
 // ---- The folder
 
-/// A robot outside its range cannot be planned: it is disabled, with that reason.
+/// A robot outside its range cannot be planned: it is disabled, with that reason. One that is
+/// beyond the end by no more than a reading may be off stands at the end, and a note says so.
 void DisableOutsiders(Plate* plate);
 
 /// Writes units.csv, origin.csv, state.csv, disabled.csv, obstacles.csv, left_out.csv, and those of

@@ -228,6 +228,9 @@ Status TakeMoves(const std::vector<std::string>& files, Plate* plate) {
                              [&](const auto& a, const auto& b) { return time_of(a) < time_of(b); });
   std::int64_t number = 0;
   for (const auto& tables : exposures) FOCALFLEET_TRY(TakeExposure(tables, ++number, plate));
+  std::vector<NamedTable> all;
+  for (auto& tables : exposures) std::ranges::move(tables, std::back_inserter(all));
+  NotePassedOver({&all}, plate);
   double first_s = std::numeric_limits<double>::infinity();
   for (const MeasuredMove& move : plate->moves) first_s = std::min(first_s, move.t_s);
   if (std::isfinite(first_s))
@@ -256,11 +259,10 @@ Result<Plate> ReadSdss(const SourceFiles& files) {
   FOCALFLEET_TRY(TakeSdssState(state, &plate));
   DisableOutsiders(&plate);
   FOCALFLEET_TRY(TakeFiducials(files, &plate));
-  if (!files.targets.empty()) {
-    FOCALFLEET_TRY_ASSIGN(const auto targets, ReadAll(files.targets));
-    FOCALFLEET_TRY(TakeSdssTargets(targets, &plate));
-  }
+  FOCALFLEET_TRY_ASSIGN(const auto targets, ReadAll(files.targets));
+  if (!targets.empty()) FOCALFLEET_TRY(TakeSdssTargets(targets, &plate));
   FOCALFLEET_TRY(TakeMoves(files.moves, &plate));
+  NotePassedOver({&layout, &disabled, &state, &targets}, &plate);
   return plate;
 }
 

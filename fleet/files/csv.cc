@@ -238,10 +238,12 @@ class CsvParser {
     table_.units_.resize(cells.size());
     table_.conversions_.resize(cells.size());
     for (const auto& [name, unit] : units_.Units())
-      if (const auto column = table_.Find(name)) {
-        table_.units_[*column] = unit;
-        table_.conversions_[*column] = ConversionOf(table_.known_as_[*column], unit);
+      if (const auto found = table_.index_.find(name); found != table_.index_.end()) {
+        const std::size_t column = found->second;
+        table_.units_[column] = unit;
+        table_.conversions_[column] = ConversionOf(table_.known_as_[column], unit);
       }
+    table_.asked_.assign(cells.size(), 0);
     table_.columns_ = std::move(cells);
     return {};
   }
@@ -293,6 +295,7 @@ bool CsvTable::HasName(std::size_t column) const { return !IsUnnamed(columns_[co
 std::optional<std::size_t> CsvTable::Find(std::string_view column) const {
   const auto it = index_.find(column);
   if (it == index_.end()) return std::nullopt;
+  asked_[it->second] = 1;
   return it->second;
 }
 
@@ -317,6 +320,13 @@ std::vector<std::string> CsvTable::Others(std::initializer_list<std::string_view
     if (std::find(known.begin(), known.end(), known_as_[column]) == known.end())
       others.push_back(Shown(column));
   return others;
+}
+
+std::vector<std::string> CsvTable::NeverAsked() const {
+  std::vector<std::string> never;
+  for (std::size_t column = 0; column < columns_.size(); ++column)
+    if (asked_[column] == 0 && HasName(column)) never.push_back(columns_[column]);
+  return never;
 }
 
 Error CsvTable::ErrorAt(std::size_t row, std::string_view reason) const {

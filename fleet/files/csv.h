@@ -70,6 +70,9 @@ class CsvTable {
   /// Columns that are not among `known`, for a message that they were skipped.
   [[nodiscard]] std::vector<std::string> Others(
       std::initializer_list<std::string_view> known) const;
+  /// Columns with a name that no reader has looked for yet, for a message that they were passed
+  /// over. Not for tables that several threads read at a time.
+  [[nodiscard]] std::vector<std::string> NeverAsked() const;
   [[nodiscard]] Error ErrorAt(std::size_t row, std::string_view reason) const;
   /// Makes numbers of the column's declared unit numbers of the unit in its name.
   [[nodiscard]] const UnitConversion& conversion(std::size_t column) const {
@@ -103,7 +106,8 @@ class CsvTable {
   std::vector<std::string> units_;           // as declared; Shape: (columns)
   std::vector<UnitConversion> conversions_;  // Shape: (columns)
   std::unordered_map<std::string, std::size_t, TextHash, std::equal_to<>>
-      index_;  // those with name
+      index_;                        // those with name
+  mutable std::vector<char> asked_;  // whether Find was asked for it; Shape: (columns)
   std::vector<int> lines_;
   std::vector<std::string> cells_;  // Shape: (rows, columns), flat
 };

@@ -215,6 +215,40 @@ def the_latest_state_counts():
         check("state", any((r["theta_deg"], r["phi_deg"]) == ("2", "151") for r in left), "the latest row")
 
 
+def nothing_goes_unsaid():
+    """Columns that nobody reads are named once; robots at their stops stay; targets that are all left out end with 3."""
+    if PROJECT == "moons":
+        return
+    words = import_command()
+    words[words.index("--out") + 1] = "noted"
+    if PROJECT == "sdss":
+        pathlib.Path("low.csv").write_text("positionerID,alphaReport,betaReport\n5,-0.002,170\n7,-0.02,170\n")
+        done = run([*words, "--state", "low.csv"])
+        check("stop", "1 axes up to 0.01 degrees outside their range" in done.stderr, done.stderr)
+        stands = {r["unit_id"]: r["theta_deg"] for r in rows("noted/state.csv")}
+        broken = {r["unit_id"]: r["reason"] for r in rows("noted/disabled.csv")}
+        check("stop", float(stands["5"]) == 0 and "5" not in broken, stands.get("5"))
+        check("stop", broken.get("7", "").startswith("stands outside its range"), broken)
+    layout = words[words.index("--layout") + 1]
+    if layout.endswith(".csv"):
+        text = pathlib.Path(layout).read_text().splitlines()
+        pathlib.Path(layout).write_text("\n".join(f"{line},{'COLOUR' if k == 0 else 'red'}"
+                                                  for k, line in enumerate(text)) + "\n")
+        done = run(words)
+        check("notes", f"{layout}: columns passed over: " in done.stderr and "COLOUR" in done.stderr, done.stderr)
+        check("notes", done.stderr.count("COLOUR") == 1, done.stderr)
+    ids = {"desi": "pos_id", "sdss": "positionerID", "pfs": "cobraId"}[PROJECT]
+    names = {r["unit_id"]: r["name"] for r in rows("plate/origin.csv")}
+    pathlib.Path("all.csv").write_text(f"{ids},reason\n" + "".join(
+        f"{unit if PROJECT != 'desi' else names[unit]},broken\n" for unit in names))
+    if "--disabled" in words:
+        words[words.index("--disabled") + 1] = "all.csv"
+    else:
+        words += ["--disabled", "all.csv"]
+    done = run(words)
+    check("nothing served", done.returncode == 3, f"{done.returncode} {done.stderr}")
+
+
 def fibres_go_out():
     """Measured fibres are in the project's file; an import of another project is refused."""
     units = rows("plate/units.csv")
@@ -245,6 +279,7 @@ def main():
         if not WRONG:
             broken_files()
             the_latest_state_counts()
+            nothing_goes_unsaid()
             fibres_go_out()
     for wrong in WRONG:
         print(wrong)
