@@ -30,6 +30,7 @@ struct WatchOptions {
 struct Picture {
   std::optional<FleetStatusValue> fleet;
   std::optional<ConfigurationProgressValue> configuration;
+  std::optional<AuditHeadValue> audit_head;
   std::map<BusId, BusStatusValue> buses;
   std::map<UnitId, UnitStatusValue> units;
   std::map<std::uint64_t, AlarmValue> alarms;  // the newest kAlarmsShown
@@ -43,6 +44,7 @@ void Absorb(const StatusUpdate& update, Picture* picture) {
     picture->fleet = update.fleet;
     picture->fleet->version = Printable(update.fleet->version);
   }
+  if (update.audit_head) picture->audit_head = update.audit_head;
   if (update.configuration) {
     picture->configuration = update.configuration;
     picture->configuration->view.source = Printable(update.configuration->view.source);
@@ -166,11 +168,14 @@ Json JsonOf(const StatusUpdate& update) {
   if (!update.units.empty()) object["units"] = Rows(update.units);
   if (!update.buses.empty()) object["buses"] = Rows(update.buses);
   if (!update.alarms.empty()) object["alarms"] = Rows(update.alarms);
+  if (update.audit_head) object["audit_head"] = Printable(update.audit_head->head);
   return object;
 }
 
 StatusUpdate Whole(const Picture& picture) {
-  StatusUpdate whole{.fleet = picture.fleet, .configuration = picture.configuration};
+  StatusUpdate whole{.fleet = picture.fleet,
+                     .configuration = picture.configuration,
+                     .audit_head = picture.audit_head};
   for (const auto& [id, unit] : picture.units) whole.units.push_back(unit);
   for (const auto& [id, bus] : picture.buses) whole.buses.push_back(bus);
   for (const auto& [id, alarm] : picture.alarms) whole.alarms.push_back(alarm);

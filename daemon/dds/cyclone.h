@@ -20,6 +20,7 @@ inline constexpr const char* kOrientationTopic = "focalfleet/unit_orientation";
 inline constexpr const char* kBusTopic = "focalfleet/bus_status";
 inline constexpr const char* kConfigurationTopic = "focalfleet/configuration_progress";
 inline constexpr const char* kAlarmTopic = "focalfleet/named_alarm";
+inline constexpr const char* kAuditHeadTopic = "focalfleet/audit_head";
 inline constexpr const char* kExposureRequestTopic = "focalfleet/exposure_request";
 inline constexpr const char* kExposureTopic = "focalfleet/exposure";
 

@@ -215,6 +215,11 @@ void ToSample(const AlarmValue& value, focalfleet_NamedAlarm* sample) {
   CopyText(value.row.text, sample->text);
 }
 
+void ToSample(const AuditHeadValue& value, focalfleet_AuditHead* sample) {
+  sample->time_ns = value.at.ns;
+  CopyText(value.head, sample->head);
+}
+
 bool FromSample(const focalfleet_UnitStatus& sample, UnitStatusValue* value) {
   value->at = {sample.time_ns};
   value->low_deg = {sample.theta_low_deg, sample.phi_low_deg};
@@ -322,6 +327,12 @@ bool FromSample(const focalfleet_NamedAlarm& sample, AlarmValue* value) {
   value->row.text = TextOf(sample.text);
   value->row.name = AlarmNameOf(TextOf(sample.name));  // one of a later version has none here
   return Take(sample.severity, kLastSeverity, &value->row.severity);
+}
+
+bool FromSample(const focalfleet_AuditHead& sample, AuditHeadValue* value) {
+  value->at = WallTime{sample.time_ns};
+  value->head = TextOf(sample.head);
+  return true;
 }
 
 }  // namespace focalfleet::dds_internal

@@ -21,6 +21,7 @@ void ToSample(const BusStatusValue& value, focalfleet_BusStatus* sample);
 void ToSample(const FleetStatusValue& value, focalfleet_FleetStatus* sample);
 void ToSample(const ConfigurationProgressValue& value, focalfleet_ConfigurationProgress* sample);
 void ToSample(const AlarmValue& value, focalfleet_NamedAlarm* sample);
+void ToSample(const AuditHeadValue& value, focalfleet_AuditHead* sample);
 
 /// Fills `value`. False: the sample has a code that this version does not know.
 bool FromSample(const focalfleet_UnitStatus& sample, UnitStatusValue* value);
@@ -29,5 +30,6 @@ bool FromSample(const focalfleet_BusStatus& sample, BusStatusValue* value);
 bool FromSample(const focalfleet_FleetStatus& sample, FleetStatusValue* value);
 bool FromSample(const focalfleet_ConfigurationProgress& sample, ConfigurationProgressValue* value);
 bool FromSample(const focalfleet_NamedAlarm& sample, AlarmValue* value);
+bool FromSample(const focalfleet_AuditHead& sample, AuditHeadValue* value);
 
 }  // namespace focalfleet::dds_internal

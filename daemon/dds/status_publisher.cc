@@ -36,6 +36,9 @@ std::uint64_t PayloadBytes(const focalfleet_FleetStatus& sample) {
 std::uint64_t PayloadBytes(const focalfleet_ConfigurationProgress& sample) {
   return TextBytes(offsetof(focalfleet_ConfigurationProgress, source), sample.source);
 }
+std::uint64_t PayloadBytes(const focalfleet_AuditHead& sample) {
+  return TextBytes(offsetof(focalfleet_AuditHead, head), sample.head);
+}
 std::uint64_t PayloadBytes(const focalfleet_NamedAlarm& sample) {
   const std::uint64_t name = TextBytes(offsetof(focalfleet_NamedAlarm, name), sample.name);
   return TextBytes(name - 4, sample.text);  // the header of 4 bytes is there once
@@ -68,6 +71,7 @@ class StatusPublisher::Impl {
         {&Impl::bus_writer_, &focalfleet_BusStatus_desc, kBusTopic},
         {&Impl::configuration_writer_, &focalfleet_ConfigurationProgress_desc, kConfigurationTopic},
         {&Impl::alarm_writer_, &focalfleet_NamedAlarm_desc, kAlarmTopic},
+        {&Impl::audit_writer_, &focalfleet_AuditHead_desc, kAuditHeadTopic},
     };
     for (const auto& [writer, type, name] : list) {
       FOCALFLEET_TRY_ASSIGN(const Handle topic, MakeTopic(impl->participant_, *type, name));
@@ -118,6 +122,12 @@ class StatusPublisher::Impl {
     return WriteWaiting();
   }
 
+  Status Publish(const AuditHeadValue& audit) {
+    ToSample(audit, &audit_);
+    audit_waits_ = true;
+    return WriteWaiting();
+  }
+
   Status Publish(const AlarmValue& alarm) {
     if (const char* flaw = Flaw(alarm)) return BadCode("alarm", alarm.row.id, flaw);
     const auto same = [&alarm](const focalfleet_NamedAlarm& reported) {
@@ -134,7 +144,7 @@ class StatusPublisher::Impl {
     const Status waiting = WriteWaiting();
     static_cast<void>(waiting);
     for (const Handle writer : {fleet_writer_, unit_writer_, orientation_writer_, bus_writer_,
-                                configuration_writer_, alarm_writer_}) {
+                                configuration_writer_, alarm_writer_, audit_writer_}) {
       dds_write_flush(writer);
     }
   }
@@ -177,6 +187,10 @@ class StatusPublisher::Impl {
       FOCALFLEET_TRY_ASSIGN(const bool taken, Write(configuration_writer_, configuration_));
       configuration_waits_ = !taken;
     }
+    if (audit_waits_) {
+      FOCALFLEET_TRY_ASSIGN(const bool taken, Write(audit_writer_, audit_));
+      audit_waits_ = !taken;
+    }
     while (alarms_written_ < alarms_.size()) {
       FOCALFLEET_TRY_ASSIGN(const bool taken, Write(alarm_writer_, alarms_[alarms_written_]));
       if (!taken) break;
@@ -202,11 +216,14 @@ class StatusPublisher::Impl {
   Handle bus_writer_ = 0;
   Handle configuration_writer_ = 0;
   Handle alarm_writer_ = 0;
+  Handle audit_writer_ = 0;
 
   focalfleet_FleetStatus fleet_{};
   focalfleet_ConfigurationProgress configuration_{};
+  focalfleet_AuditHead audit_{};
   bool fleet_waits_ = false;
   bool configuration_waits_ = false;
+  bool audit_waits_ = false;
   std::deque<focalfleet_NamedAlarm> alarms_;  // the newest kAlarmsKept
   std::size_t alarms_written_ = 0;            // number of these written, from the front
   PublisherCounters counters_;
@@ -233,6 +250,7 @@ Status StatusPublisher::Publish(const FleetStatusValue& fleet) { return impl_->P
 Status StatusPublisher::Publish(const ConfigurationProgressValue& configuration) {
   return impl_->Publish(configuration);
 }
+Status StatusPublisher::Publish(const AuditHeadValue& audit) { return impl_->Publish(audit); }
 Status StatusPublisher::Publish(const AlarmValue& alarm) { return impl_->Publish(alarm); }
 void StatusPublisher::Flush() { impl_->Flush(); }
 const PublisherCounters& StatusPublisher::counters() const { return impl_->counters(); }

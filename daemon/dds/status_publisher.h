@@ -1,4 +1,4 @@
-// StatusPublisher publishes the daemon's state on DDS. Six topics each keep their last state for
+// StatusPublisher publishes the daemon's state on DDS. Seven topics each keep their last state for
 // readers that join late. The last value wins and nothing waits: a reader that does not read costs
 // the other readers nothing and the daemon no time.
 //
@@ -57,6 +57,7 @@ class StatusPublisher {
   Result<std::size_t> Publish(std::span<const BusStatusValue> buses);
   Status Publish(const FleetStatusValue& fleet);
   Status Publish(const ConfigurationProgressValue& configuration);
+  Status Publish(const AuditHeadValue& audit);
   /// Publishes an alarm as an instance of its own, so a reader sees each alarm once. The newest
   /// kAlarmsKept stay for late joiners.
   Status Publish(const AlarmValue& alarm);

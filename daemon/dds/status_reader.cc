@@ -27,6 +27,7 @@ class StatusReader::Impl {
                           impl->Open(focalfleet_ConfigurationProgress_desc, kConfigurationTopic));
     FOCALFLEET_TRY_ASSIGN(impl->buses_, impl->Open(focalfleet_BusStatus_desc, kBusTopic));
     FOCALFLEET_TRY_ASSIGN(impl->alarms_, impl->Open(focalfleet_NamedAlarm_desc, kAlarmTopic));
+    FOCALFLEET_TRY_ASSIGN(impl->audit_, impl->Open(focalfleet_AuditHead_desc, kAuditHeadTopic));
     if (options.units) {
       FOCALFLEET_TRY_ASSIGN(impl->units_, impl->Open(focalfleet_UnitStatus_desc, kUnitTopic));
       FOCALFLEET_TRY_ASSIGN(impl->orientations_,
@@ -62,6 +63,7 @@ class StatusReader::Impl {
     out->orientations.clear();
     out->buses.clear();
     out->alarms.clear();
+    out->audit_head.reset();
     out->malformed = 0;
     FOCALFLEET_TRY((Drain<focalfleet_FleetStatus, FleetStatusValue>(
         fleet_, out, [out](FleetStatusValue value) { out->fleet = std::move(value); })));
@@ -72,6 +74,8 @@ class StatusReader::Impl {
         buses_, out, [out](BusStatusValue value) { out->buses.push_back(value); })));
     FOCALFLEET_TRY((Drain<focalfleet_NamedAlarm, AlarmValue>(
         alarms_, out, [out](AlarmValue value) { out->alarms.push_back(std::move(value)); })));
+    FOCALFLEET_TRY((Drain<focalfleet_AuditHead, AuditHeadValue>(
+        audit_, out, [out](AuditHeadValue value) { out->audit_head = std::move(value); })));
     if (units_ == 0) return {};
     FOCALFLEET_TRY((Drain<focalfleet_UnitOrientation, UnitOrientationValue>(
         orientations_, out,
@@ -134,6 +138,7 @@ class StatusReader::Impl {
   Handle configuration_ = 0;
   Handle buses_ = 0;
   Handle alarms_ = 0;
+  Handle audit_ = 0;
   Handle units_ = 0;  // 0: not wanted
   Handle orientations_ = 0;
 };

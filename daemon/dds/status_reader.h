@@ -15,8 +15,8 @@
 
 namespace focalfleet {
 
-/// The samples that arrived. For units, buses, fleet and configuration only the newest value is
-/// kept; alarms are kept one by one.
+/// The samples that arrived. Alarms are kept one by one; of all else only the newest value is
+/// kept.
 struct StatusUpdate {
   std::optional<FleetStatusValue> fleet;
   std::optional<ConfigurationProgressValue> configuration;
@@ -24,11 +24,12 @@ struct StatusUpdate {
   std::vector<UnitOrientationValue> orientations;
   std::vector<BusStatusValue> buses;
   std::vector<AlarmValue> alarms;
+  std::optional<AuditHeadValue> audit_head;
   std::uint32_t malformed = 0;
 
   [[nodiscard]] std::size_t count() const {
     return (fleet ? 1u : 0u) + (configuration ? 1u : 0u) + units.size() + orientations.size() +
-           buses.size() + alarms.size();
+           buses.size() + alarms.size() + (audit_head ? 1u : 0u);
   }
 };
 

@@ -74,6 +74,11 @@ struct ConfigurationProgressValue {
   ConfigurationView view;  // its host instants are not sent; source: at most 255 bytes are sent
 };
 
+struct AuditHeadValue {
+  WallTime at;
+  std::string head;  // as audit_chain.h writes it; at most 127 bytes are sent
+};
+
 struct AlarmValue {
   WallTime at;
   AlarmRow row;  // text: at most 255 bytes are sent

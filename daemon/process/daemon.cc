@@ -236,7 +236,10 @@ Status Daemon::OpenCamera() {
           status_.troubles->Report(AlarmName::kCameraDdsMissing, "the camera", text);
         }});
   } else {
-    FOCALFLEET_TRY_ASSIGN(port, CameraFolder::Open(config_.camera.directory, site.sensor));
+    FOCALFLEET_TRY_ASSIGN(
+        port, CameraFolder::Open(config_.camera.directory, site.sensor,
+                                 config_.camera.drop_place ? CameraFolder::Place::kDropPlace
+                                                           : CameraFolder::Place::kFolder));
   }
   measuring_.camera = std::make_unique<CameraWorker>(
       std::move(port),
@@ -278,7 +281,9 @@ Status Daemon::StartThreads() {
   FOCALFLEET_TRY(
       StartStatusThread([this] { stored_.writer->Wake(); }, Answering(&service_.status), &status_));
   StoreThread::Sinks sinks = StoreSinks();
-  FOCALFLEET_TRY_ASSIGN(sinks.upkeep, UpkeepOf(store_.get(), config_.store.keep_days));
+  FOCALFLEET_TRY_ASSIGN(sinks.upkeep,
+                        UpkeepOf(store_.get(), config_.store.keep_days,
+                                 [this](const AuditHead& head) { return status_.Report(head); }));
   FOCALFLEET_TRY_ASSIGN(stored_.writer, StoreThread::Create(std::move(sinks), signal_.get()));
   FOCALFLEET_TRY_ASSIGN(
       planner_, PlannerThread::Create(

@@ -22,6 +22,12 @@ void OpenPublisher(const DaemonConfig::Dds& dds, StatusOutput* out) {
 
 }  // namespace
 
+bool StatusOutput::Report(const AuditHead& head) const {
+  if (thread == nullptr) return true;
+  StatusBatch batch{.audit_head = AuditHeadValue{WallTime::Now(), Text(head)}};
+  return thread->Publish(&batch);
+}
+
 void OpenStatusOutput(const DaemonConfig& config, const Layout& layout, WallTime started,
                       const HostClock& clock, StatusOutput* out) {
   if (config.dds.enabled || config.camera.dds) WarnOfDdsEnvironment(config.dds);

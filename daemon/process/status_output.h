@@ -14,6 +14,7 @@
 #include "daemon/status/dds_troubles.h"
 #include "daemon/status/renewing_status_publisher.h"
 #include "daemon/status/status_scheduler.h"
+#include "daemon/store/audit_chain.h"
 
 namespace focalfleet {
 
@@ -25,6 +26,9 @@ struct StatusOutput {
   std::unique_ptr<StatusScheduler> scheduler;          // none: neither publisher nor page
   std::unique_ptr<StatusThread> thread;  // none: the same. Ends before publisher and page
   std::unique_ptr<BoundedEnd> ending;
+
+  /// Publishes the head of the audit. On the store's thread. False: the status thread is behind.
+  [[nodiscard]] bool Report(const AuditHead& head) const;
 };
 
 /// All parts but the thread and the end. `layout` outlives them. Pre: `out` has its troubles, and

@@ -24,17 +24,17 @@ Result<std::function<bool()>> PruningOf(Store* store, std::uint32_t keep_days) {
   };
 }
 
-Result<std::function<bool()>> UpkeepOf(Store* store, std::uint32_t keep_days) {
+Result<std::function<bool()>> UpkeepOf(Store* store, std::uint32_t keep_days,
+                                       std::function<bool(const AuditHead&)> report) {
   FOCALFLEET_TRY_ASSIGN(auto prune, PruningOf(store, keep_days));
-  return [store, prune = std::move(prune), reported = AuditHead(), more = false]() mutable {
+  return [store, prune = std::move(prune), report = std::move(report), logged = AuditHead(),
+          reported = AuditHead(), more = false]() mutable {
     // Pieces of pruning follow one another; the head is for the first of each round.
     if (!more) {
       const auto head = store->LastAudit();
       if (!head) spdlog::warn("the head of the audit is not known: {}", head.error().text);
-      if (head && *head != reported) {
-        reported = *head;
-        LogAuditHead(*head);
-      }
+      if (head && *head != logged) LogAuditHead(logged = *head);
+      if (head && *head != reported && report(*head)) reported = *head;
     }
     more = prune();
     return more;

@@ -14,6 +14,7 @@ bool BufferedStatusPublisher::Publish(const StatusBatch& status) {
   Offer(&buses_);
   Offer(&fleet_);
   Offer(&configuration_);
+  Offer(&audit_head_);
   ReportAlarms();
   joined_.get()->Flush();
   Count();
@@ -35,6 +36,7 @@ void BufferedStatusPublisher::Keep(const StatusBatch& status) {
   buses_.Keep(status.buses);
   if (status.fleet) fleet_ = status.fleet;
   if (status.configuration) configuration_ = status.configuration;
+  if (status.audit_head) audit_head_ = status.audit_head;
 }
 
 template <class Value>

@@ -87,6 +87,7 @@ class BufferedStatusPublisher {
   Newest<BusStatusValue> buses_;
   std::optional<FleetStatusValue> fleet_;
   std::optional<ConfigurationProgressValue> configuration_;
+  std::optional<AuditHeadValue> audit_head_;
   std::deque<AlarmValue> alarms_;
   std::string last_error_;
   std::atomic<std::uint64_t> samples_{0};

@@ -53,6 +53,7 @@ void RenewingStatusPublisher::Remember(const StatusBatch& status) {
   buses_.Keep(status.buses, &BusKey);
   if (status.fleet) rest_.fleet = status.fleet;
   if (status.configuration) rest_.configuration = status.configuration;
+  if (status.audit_head) rest_.audit_head = status.audit_head;
 }
 
 void RenewingStatusPublisher::RenewIfAsked() {

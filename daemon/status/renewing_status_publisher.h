@@ -56,7 +56,7 @@ class RenewingStatusPublisher {
   Latest<UnitStatusValue> units_;
   Latest<UnitOrientationValue> orientations_;
   Latest<BusStatusValue> buses_;
-  StatusBatch rest_;  // fleet and configuration
+  StatusBatch rest_;  // fleet, configuration, head of the audit
   std::deque<AlarmValue> alarms_;
   std::atomic<bool> asked_{false};
   std::uint64_t earlier_samples_ = 0;  // of participants that are gone

@@ -17,6 +17,7 @@ struct StatusBatch {
   std::vector<BusStatusValue> buses;
   std::optional<FleetStatusValue> fleet;
   std::optional<ConfigurationProgressValue> configuration;
+  std::optional<AuditHeadValue> audit_head;
   double makespan_s = 0;  // of the configuration so far; DDS has that of the rounds that ended
 };
 

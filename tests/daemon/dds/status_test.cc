@@ -57,6 +57,7 @@ struct Seen {
   std::map<std::uint64_t, AlarmValue> alarm_values;
   std::optional<FleetStatusValue> fleet;
   std::optional<ConfigurationProgressValue> configuration;
+  std::optional<AuditHeadValue> audit_head;
   std::uint32_t malformed = 0;
 };
 
@@ -76,6 +77,7 @@ bool TakeUntil(StatusReader& reader, Seen* seen, const std::function<bool()>& en
     }
     if (update.fleet) seen->fleet = update.fleet;
     if (update.configuration) seen->configuration = update.configuration;
+    if (update.audit_head) seen->audit_head = update.audit_head;
     seen->malformed += update.malformed;
   }
   return true;
@@ -183,10 +185,15 @@ TEST(Status, FleetBusAndConfigurationComeAcross) {
   ASSERT_TRUE(publisher->Publish(fleet));
   EXPECT_EQ(publisher->Publish(std::span(&bus, 1)), 1u);
   ASSERT_TRUE(publisher->Publish(configuration));
+  const std::string head = "18446744073709551615:" + std::string(64, 'f');  // the longest one
+  ASSERT_TRUE(publisher->Publish(AuditHeadValue{.at = {6}, .head = head}));
   publisher->Flush();
   Seen seen;
-  ASSERT_TRUE(TakeUntil(
-      *reader, &seen, [&] { return seen.fleet && seen.configuration && seen.buses.contains(7); }));
+  ASSERT_TRUE(TakeUntil(*reader, &seen, [&] {
+    return seen.fleet && seen.configuration && seen.audit_head && seen.buses.contains(7);
+  }));
+  EXPECT_EQ(seen.audit_head->at, WallTime{6});
+  EXPECT_EQ(seen.audit_head->head, head);
   EXPECT_EQ(seen.fleet->version, "0.1.0");
   EXPECT_EQ(seen.fleet->started, WallTime{4});
   EXPECT_EQ(seen.fleet->enabled, 4990u);
