@@ -48,20 +48,24 @@ CameraFile KindOfName(std::string_view name) {
   return EndsInOneOf(lower, kForeignEndings) ? CameraFile::kForeign : CameraFile::kNotOurs;
 }
 
-Result<CameraFolder::Folders> CameraFolder::OpenAll(const std::string& path) {
-  FOCALFLEET_TRY_ASSIGN(GuardedFolder camera, GuardedFolder::Open(path));
-  FOCALFLEET_TRY_ASSIGN(GuardedFolder taken, camera.Subfolder("taken"));
-  FOCALFLEET_TRY_ASSIGN(GuardedFolder refused, camera.Subfolder("refused"));
-  return Folders{std::move(camera), std::move(taken), std::move(refused)};
+Result<CameraFolder::Folders> CameraFolder::OpenAll(const std::string& path, Place place) {
+  FOCALFLEET_TRY_ASSIGN(GuardedFolder requests, GuardedFolder::Open(path));
+  FOCALFLEET_TRY_ASSIGN(GuardedFolder files, place == Place::kDropPlace
+                                                 ? requests.Subfolder("drop")
+                                                 : GuardedFolder::Open(path));
+  FOCALFLEET_TRY_ASSIGN(GuardedFolder taken, requests.Subfolder("taken"));
+  FOCALFLEET_TRY_ASSIGN(GuardedFolder refused, requests.Subfolder("refused"));
+  return Folders{std::move(requests), std::move(files), std::move(taken), std::move(refused)};
 }
 
-Result<std::unique_ptr<CameraFolder>> CameraFolder::Open(std::string path, SensorLimits sensor) {
-  auto folders = OpenAll(path);
+Result<std::unique_ptr<CameraFolder>> CameraFolder::Open(std::string path, SensorLimits sensor,
+                                                         Place place) {
+  auto folders = OpenAll(path, place);
   if (!folders)
     return Fail(folders.error().code, "camera folder " + path + ": " + folders.error().text);
   std::unique_ptr<CameraFolder> folder(
-      new CameraFolder(std::move(path), std::move(*folders), sensor));
-  const auto names = folder->folders_.camera.Names(limits::kCameraFiles);
+      new CameraFolder(std::move(path), std::move(*folders), sensor, place));
+  const auto names = folder->folders_.files.Names(limits::kCameraFiles);
   // A folder that is too full is reported when the first exposure is due: a fleet moves without it.
   if (!names && names.error().code == ErrorCode::kFull) return folder;
   if (!names) return tl::unexpected(names.error());
@@ -73,15 +77,15 @@ Result<std::unique_ptr<CameraFolder>> CameraFolder::Open(std::string path, Senso
 
 Status CameraFolder::Request(std::uint64_t id, WallTime since) {
   // The path may lead elsewhere by now: the folder may have been cleared up or mounted anew.
-  FOCALFLEET_TRY_ASSIGN(folders_, OpenAll(path_));
-  return folders_.camera.Write(kRequest, "{\"exposure\": " + std::to_string(id) +
-                                             ", \"since_utc\": \"" + UtcOf(since.ns) + "\"}\n");
+  FOCALFLEET_TRY_ASSIGN(folders_, OpenAll(path_, place_));
+  return folders_.requests.Write(kRequest, "{\"exposure\": " + std::to_string(id) +
+                                               ", \"since_utc\": \"" + UtcOf(since.ns) + "\"}\n");
 }
 
 Result<std::optional<Exposure>> CameraFolder::Take() {
   FOCALFLEET_TRY_ASSIGN(const std::string name, NextFile());
   if (name.empty()) return std::optional<Exposure>();
-  const GuardedFolder& folder = folders_.camera;
+  const GuardedFolder& folder = folders_.files;
   auto exposure = [&]() -> Result<Exposure> {
     if (KindOfName(name) == CameraFile::kForeign)
       return Fail(ErrorCode::kInvalid,
@@ -102,14 +106,14 @@ Result<std::optional<Exposure>> CameraFolder::Take() {
 /// The first file by name, so that the files of a camera that counts are taken in its order. Empty:
 /// there is none.
 Result<std::string> CameraFolder::NextFile() {
-  FOCALFLEET_TRY_ASSIGN(const auto names, folders_.camera.Names(limits::kCameraFiles));
+  FOCALFLEET_TRY_ASSIGN(const auto names, folders_.files.Names(limits::kCameraFiles));
   std::erase_if(stays_, [&](const auto& stays) {
     return !std::binary_search(names.begin(), names.end(), stays.first);
   });
   for (const std::string& name : names) {
     if (KindOfName(name) == CameraFile::kNotOurs) continue;
     const auto stays = stays_.find(name);
-    if (stays != stays_.end() && folders_.camera.IdentityOf(name) == stays->second) continue;
+    if (stays != stays_.end() && folders_.files.IdentityOf(name) == stays->second) continue;
     return name;
   }
   return std::string();
@@ -117,9 +121,9 @@ Result<std::string> CameraFolder::NextFile() {
 
 // A file that cannot be moved would be read for ever, so it is remembered.
 void CameraFolder::SetAside(const std::string& name, const GuardedFolder& folder) {
-  const auto identity = folders_.camera.IdentityOf(name);
+  const auto identity = folders_.files.IdentityOf(name);
   stays_.erase(name);
-  if (!folders_.camera.Move(name, folder) && identity) stays_.emplace(name, *identity);
+  if (!folders_.files.Move(name, folder) && identity) stays_.emplace(name, *identity);
 }
 
 void CameraFolder::Refuse(const std::string& name, const std::string& reason) {

@@ -14,6 +14,9 @@
 // Files that lie in the folder when the daemon starts are set aside as refused, since they answer
 // no request.
 //
+// With a drop place the camera puts its files into the subfolder drop/ instead, and needs to write
+// nowhere else: requests and what was taken are then the daemon's alone.
+//
 // The camera may run as another user, and may be broken or hostile (daemon/files/guarded_folder.h).
 // Nothing of it is deleted. A file that cannot be moved stays, and is looked at again when it has
 // changed.
@@ -38,23 +41,28 @@ CameraFile KindOfName(std::string_view name);
 
 class CameraFolder : public CameraPort {
  public:
-  /// Makes the folder where it is missing.
+  /// Where the camera puts its files.
+  enum class Place : std::uint8_t { kFolder, kDropPlace };
+
+  /// Makes the folder where it is missing, and its drop place.
   /// Errors: kUnavailable, with the folder's path.
-  static Result<std::unique_ptr<CameraFolder>> Open(std::string path, SensorLimits sensor);
+  static Result<std::unique_ptr<CameraFolder>> Open(std::string path, SensorLimits sensor,
+                                                    Place place = Place::kFolder);
 
   Status Request(std::uint64_t id, WallTime since) override;
   Result<std::optional<Exposure>> Take() override;
 
  private:
   struct Folders {
-    GuardedFolder camera;
+    GuardedFolder requests;
+    GuardedFolder files;  // from the camera: the same folder, or the drop place
     GuardedFolder taken;
     GuardedFolder refused;
   };
-  static Result<Folders> OpenAll(const std::string& path);
+  static Result<Folders> OpenAll(const std::string& path, Place place);
 
-  CameraFolder(std::string path, Folders folders, SensorLimits sensor)
-      : path_(std::move(path)), folders_(std::move(folders)), sensor_(sensor) {}
+  CameraFolder(std::string path, Folders folders, SensorLimits sensor, Place place)
+      : path_(std::move(path)), folders_(std::move(folders)), sensor_(sensor), place_(place) {}
   Result<std::string> NextFile();
   void SetAside(const std::string& name, const GuardedFolder& folder);
   void Refuse(const std::string& name, const std::string& reason);
@@ -62,6 +70,7 @@ class CameraFolder : public CameraPort {
   std::string path_;
   Folders folders_;
   SensorLimits sensor_;
+  Place place_ = Place::kFolder;
   std::map<std::string, FileIdentity> stays_;  // files that could not be moved
 };
 

@@ -287,6 +287,8 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
                   "their start");
   reader->Require(!config.camera.present() || !config.camera.fiducials.empty(), "camera",
                   "fiducials", "camera.fiducials must name a file where there is a camera");
+  reader->Require(!config.camera.drop_place || !config.camera.directory.empty(), "camera",
+                  "drop_place", "camera.drop_place is of camera.directory, which is empty");
   reader->Require(!config.camera.dds || config.camera.directory.empty(), "camera", "dds",
                   "a camera answers through camera.directory or through camera.dds, not both");
   reader->Require(IsNumericAddress(config.metrics.address), "metrics", "address",

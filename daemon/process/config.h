@@ -86,6 +86,7 @@ struct DaemonConfig {
     // Requests and answers go through a folder (camera/camera_folder.h), or through topics of
     // [dds] (camera/camera_dds.h). With neither of them there is no camera.
     std::string directory;
+    bool drop_place = false;  // the camera writes into its subfolder drop/ alone
     bool dds = false;
     [[nodiscard]] bool present() const { return dds || !directory.empty(); }
     std::string fiducials;  // fiducials.csv

@@ -33,6 +33,8 @@ void VisitInstrumentKeys(Config* c, Visitor* visit) {
   visit->Section("camera", "The fibre-view camera, for corrections");
   visit->Path("directory", &c->camera.directory,
               "Folder for exposure requests and spot lists; empty: no camera there");
+  visit->Flag("drop_place", &c->camera.drop_place,
+              "Spot lists come into the subfolder drop/, the only one that the camera writes");
   visit->Flag("dds", &c->camera.dds,
               "Whether requests and spot lists go by DDS topics in the domain of [dds]");
   visit->Path("fiducials", &c->camera.fiducials,

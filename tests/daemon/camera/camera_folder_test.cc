@@ -203,6 +203,30 @@ TEST_P(CameraFolderTest, WhatIsNoFileIsRefusedWithoutLookingIntoIt) {
   EXPECT_TRUE(Exists(File("refused/folder.csv/theirs")));
 }
 
+TEST_P(CameraFolderTest, ADropPlaceIsAllThatTheCameraNeeds) {
+  folder_ =
+      CameraFolder::Open(*files_ / "camera", kSensor, CameraFolder::Place::kDropPlace).value();
+  fs::permissions(*files_ / "", fs::perms::others_exec, fs::perm_options::add);
+  fs::permissions(File(""), fs::perms::others_exec, fs::perm_options::add);
+  fs::permissions(File("drop"), fs::perms::all);
+  ASSERT_TRUE(folder_->Request(1, kSince));
+  {
+    // The camera's account; where this test is not root's it is the daemon's own.
+    const AsUser camera(GetParam() == 0 ? test::UsersOfTests().back() : GetParam());
+    Put("drop/x.csv", WriteSpots(Three("x")));
+    if (GetParam() == 0) {
+      EXPECT_FALSE(WriteFileAtomically(File("request.json"), "{}"));
+      EXPECT_FALSE(WriteFileAtomically(File("taken/x.csv"), "forged"));
+    }
+  }
+  Put("beside.csv", WriteSpots(Three("beside")));
+  EXPECT_EQ(TakenId(), "x");
+  EXPECT_TRUE(Exists(File("taken/x.csv")));
+  EXPECT_FALSE(Exists(File("drop/x.csv")));
+  EXPECT_EQ(TakenId(), "nothing");
+  EXPECT_TRUE(Exists(File("beside.csv"))) << "beside the drop place nothing is looked at";
+}
+
 TEST_P(CameraFolderTest, ALinkToWhereThingsAreSetAsideIsRefused) {
   for (const char* part : {"taken", "refused"}) {
     fs::create_directories(File(""));
