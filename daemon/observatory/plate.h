@@ -130,8 +130,8 @@ void LeaveOut(const NamedTable& table, std::size_t row, const std::string& unit,
 
 // ---- The folder
 
-/// A robot outside its range cannot be planned: it is disabled, with that reason. One that is
-/// beyond the end by no more than a reading may be off stands at the end, and a note says so.
+/// A robot outside its range cannot be planned: it is disabled, with that reason. A robot
+/// that is beyond by no more than a reading may be off stands at the end, and a note says so.
 void DisableOutsiders(Plate* plate);
 
 /// Writes units.csv, origin.csv, state.csv, disabled.csv, obstacles.csv, left_out.csv, and those of

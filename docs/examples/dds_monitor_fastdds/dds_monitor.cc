@@ -1,9 +1,10 @@
 // Prints the state of each unit that focalfleetd publishes over DDS: once on joining, then with
 // each change. When all units of the fleet were seen, the program says so.
 //
-//   dds_monitor_fastdds [DOMAIN] [--once] [--wait SECONDS]
+//   dds_monitor_fastdds [DOMAIN] [--once] [--wait SECONDS] [--credentials FOLDER]
 //
-// With --once the program ends when all were seen (exit code 0), or after the wait (1).
+// With --once the program ends when all were seen (exit code 0), or after the wait (1). The folder
+// of credentials is one that deploy/dds-security/make-keys made for a monitor.
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
@@ -21,6 +22,7 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <filesystem>
 #include <memory>
 #include <set>
 #include <string>
@@ -52,13 +54,33 @@ T* Check(T* made, const char* what) {
   std::exit(1);
 }
 
+// DDS Security by the plugins that every vendor has. Paths are absolute: Fast DDS takes the rest of
+// `file://` as it is.
+void AddCredentials(const std::string& folder, eprosima::fastrtps::rtps::PropertyPolicy* policy) {
+  const std::string file = "file://" + std::filesystem::absolute(folder).string() + "/";
+  const std::string identity = "dds.sec.auth.builtin.PKI-DH.";
+  const std::string access = "dds.sec.access.builtin.Access-Permissions.";
+  for (const auto& [name, value] :
+       {std::pair<std::string, std::string>{"dds.sec.auth.plugin", "builtin.PKI-DH"},
+        {identity + "identity_ca", file + "identity_ca.pem"},
+        {identity + "identity_certificate", file + "certificate.pem"},
+        {identity + "private_key", file + "key.pem"},
+        {"dds.sec.access.plugin", "builtin.Access-Permissions"},
+        {access + "permissions_ca", file + "permissions_ca.pem"},
+        {access + "governance", file + "governance.p7s"},
+        {access + "permissions", file + "permissions.p7s"},
+        {"dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC"}})
+    policy->properties().emplace_back(name, value);
+}
+
 // As in deploy/cyclonedds.xml: loopback only, no multicast, up to 120 programs on this machine.
-fast::DomainParticipant* MakeParticipant(unsigned domain) {
+fast::DomainParticipant* MakeParticipant(unsigned domain, const std::string& credentials) {
   auto transport = std::make_shared<rtps::UDPv4TransportDescriptor>();
   transport->interfaceWhiteList.emplace_back("127.0.0.1");
   transport->maxInitialPeersRange = 120;
   transport->receiveBufferSize = 4 << 20;
   fast::DomainParticipantQos qos;
+  if (!credentials.empty()) AddCredentials(credentials, &qos.properties());
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.push_back(transport);
   eprosima::fastrtps::rtps::Locator_t loopback;
@@ -123,18 +145,21 @@ int main(int argc, char** argv) {
   unsigned domain = 0;
   bool once = false;
   double wait_s = 10;
+  std::string credentials;
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--once") == 0)
       once = true;
     else if (std::strcmp(argv[i], "--wait") == 0 && i + 1 < argc)
       wait_s = std::atof(argv[++i]);
+    else if (std::strcmp(argv[i], "--credentials") == 0 && i + 1 < argc)
+      credentials = argv[++i];
     else
       domain = static_cast<unsigned>(std::atoi(argv[i]));
   }
   const auto began = Clock::now();
   eprosima::fastrtps::rtps::Time_t began_at;
   eprosima::fastrtps::rtps::Time_t::now(began_at);
-  fast::DomainParticipant* participant = MakeParticipant(domain);
+  fast::DomainParticipant* participant = MakeParticipant(domain, credentials);
   fast::DataReader* units =
       MakeReader<focalfleet::UnitStatusPubSubType>(participant, "focalfleet/unit_status");
   fast::DataReader* fleet =

@@ -393,8 +393,9 @@ std::vector<double> DrawTogether(const std::vector<LogVariance>& estimates) {
 
 // The variance of the camera's noise in an exposure, by its present factor.
 LogVariance ExposureVariance(const std::vector<const WhiteRow*>& rows, double factor) {
-  // Of the present variance: less is not resolved in one step. Half, this and twice of it: 5, 4 and
-  // 4 of 40 campaigns without an effect (60 units, 12 moves) are given a cause.
+  // A smaller share of the variance is not resolved in one step. Half of it,
+  // it and twice of it: 5, 4 and 4 of 40 campaigns without an effect (60 units, 12 moves) are given
+  // a cause.
   constexpr double kLeast = 0.05;
   constexpr std::size_t kRowsMin = 6;  // fewer say next to nothing beside what they have alike
   if (rows.size() < kRowsMin) return {};

@@ -206,8 +206,8 @@ TEST_P(CameraFolderTest, WhatIsNoFileIsRefusedWithoutLookingIntoIt) {
 TEST_P(CameraFolderTest, ADropPlaceIsAllThatTheCameraNeeds) {
   folder_ =
       CameraFolder::Open(*files_ / "camera", kSensor, CameraFolder::Place::kDropPlace).value();
-  fs::permissions(*files_ / "", fs::perms::others_exec, fs::perm_options::add);
-  fs::permissions(File(""), fs::perms::others_exec, fs::perm_options::add);
+  for (const std::string& folder : {*files_ / "", File("")})
+    fs::permissions(folder, fs::perms::group_exec | fs::perms::others_exec, fs::perm_options::add);
   fs::permissions(File("drop"), fs::perms::all);
   ASSERT_TRUE(folder_->Request(1, kSince));
   {

@@ -4,28 +4,16 @@
 """
 
 import os
-import pathlib
 import re
 import subprocess
 import sys
 import tempfile
 
+from dds_examples import ROOT, build
 from simulated_fleet import WAIT_S, SimulatedFleet
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
 UNITS = 5000
 LATE_JOINERS_MAX = 20  # a second or two each
-
-
-def build(example, folder):
-    folder = pathlib.Path(folder, example)
-    configure = ["cmake", "-S", ROOT / "docs/examples" / example, "-B", folder, "-G", "Ninja",
-                 f"-DFOCALFLEET_IDL={ROOT / 'daemon/dds/focalfleet.idl'}"]  # fmt: skip
-    for command in (configure, ["cmake", "--build", folder]):
-        done = subprocess.run(command, capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-        assert "warning:" not in done.stdout + done.stderr, done.stdout + done.stderr
-    return folder
 
 
 class Monitor:

@@ -28,14 +28,16 @@ class SimulatedFleet:
     """`count` units at their start places. Use it as a context manager.
 
     `awaited`: the units are ready, or only heard: on a loaded machine some of many fall silent.
+    `secured`: DDS Security, with credentials for each role in `keys()`.
     """
 
-    def __init__(self, programs, count, *, speed=10, camera=False, dds=False, awaited="ready"):
+    def __init__(self, programs, count, *, speed=10, camera=False, dds=False, awaited="ready", secured=False):
         self.programs = pathlib.Path(programs).resolve()
         self.count = count
         self.speed = speed
         self.camera = camera
         self.awaited = awaited
+        self.secured = secured
         self.domain, self._lock = free_domain() if dds else (None, None)
         self._folder = tempfile.TemporaryDirectory(prefix="focalfleet-")
         self.folder = pathlib.Path(self._folder.name)
@@ -65,6 +67,10 @@ class SimulatedFleet:
                 print(f"--- {log.name}", *log.read_text().splitlines()[-15:], sep="\n")
         self._folder.cleanup()
 
+    def keys(self, role):
+        """The folder of credentials for a role."""
+        return self.folder / "keys" / role
+
     def cli(self, *arguments):
         """What the command-line tool prints."""
         done = subprocess.run(
@@ -82,6 +88,11 @@ class SimulatedFleet:
         self.cli(*start, "--seed", 1, "--as", "state", "--out", "state.csv")
         self.cli(*start, "--seed", 2, "--from", "state.csv", "--as", "targets", "--out", "targets.csv")
         dds = f"enabled = true\ndomain = {self.domain}" if self.domain else "enabled = false"
+        if self.secured:
+            make_keys = pathlib.Path(__file__).resolve().parents[3] / "deploy/dds-security/make-keys"
+            subprocess.run([make_keys, self.folder / "keys", "--domain", str(self.domain)],
+                           check=True, capture_output=True)  # fmt: skip
+            dds += f'\nsecurity = "{self.keys("daemon")}"'
         camera = '[camera]\ndirectory = "camera"\nfiducials = "fiducials.csv"\n'
         (self.folder / "focalfleet.toml").write_text(
             '[fleet]\nunits = "units.csv"\n[control]\nsocket = "control.sock"\n'

@@ -1,6 +1,6 @@
 // Where each unit was seen after few moves, the fits of the units absorb much of the noise, and an
-// exposure shows few units. The rest of the noise must not look like causes. Of 40 such campaigns 4
-// are still given one, each of a single unit: more than the 1 % that is aimed at.
+// exposure shows few units. The rest of the noise must not look like causes. Four of 40 such
+// campaigns are still given one, each of a single unit: more than the 1 % that is aimed at.
 #include <gmock/gmock.h>
 
 #include <cmath>
