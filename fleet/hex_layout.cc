@@ -9,7 +9,6 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kGear = 337.0 * 45 / 17;
 constexpr double kArmPerPitch = 16.5 / 2 / 25.6;
 constexpr double kThetaEndDeg = 190;
 constexpr double kPhiMaxDeg = 180;
@@ -137,8 +136,9 @@ HexPlate MakeHexPlate(const HexLayoutOptions& options) {
     order[i] = i;
     units[i].id = UnitId{i + 1};
     units[i].base_fp = points[i];
-    units[i].axis[Index(Axis::kTheta)] = {theta_arm_mm, 0, kGear, -kThetaEndDeg, kThetaEndDeg};
-    units[i].axis[Index(Axis::kPhi)] = {phi_arm_mm, 0, kGear, 0, kPhiMaxDeg};
+    units[i].axis[Index(Axis::kTheta)] = {theta_arm_mm, 0, kHexLayoutGear, -kThetaEndDeg,
+                                          kThetaEndDeg};
+    units[i].axis[Index(Axis::kPhi)] = {phi_arm_mm, 0, kHexLayoutGear, 0, kPhiMaxDeg};
     units[i].sensors = options.sensors;
     if (options.sensors > 0)
       units[i].carrier_mm =

@@ -11,6 +11,9 @@
 
 namespace focalfleet {
 
+/// Motor turns per turn of either axis.
+inline constexpr double kHexLayoutGear = 337.0 * 45 / 17;
+
 struct HexLayoutOptions {
   std::uint32_t count = 0;
   double pitch_mm = 25.6;

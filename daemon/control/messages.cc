@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "protocol/base/json_marks.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {
@@ -45,27 +46,18 @@ std::optional<std::uint64_t> UnsignedOf(const Json& value) {
 
 /// Checks depth and number of values before any is made: a parser takes 60 bytes for a bracket.
 Status CheckShape(std::string_view line, std::size_t values_max) {
-  std::size_t depth = 0;
   std::size_t values = 0;
-  bool in_text = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    if (in_text) {
-      i += c == '\\' ? 1u : 0u;  // the next character does not end the text
-      in_text = c != '"';
-      continue;
-    }
-    in_text = c == '"';
-    if (c == ',' || c == '[' || c == '{') ++values;
-    if (c == '[' || c == '{') ++depth;
-    if ((c == ']' || c == '}') && depth > 0) --depth;
+  Status shape;
+  ForEachJsonMark(line, [&](char mark, std::size_t, std::size_t depth) {
+    if (mark == ',' || mark == '[' || mark == '{') ++values;
     if (depth > limits::kControlDepth)
-      return Malformed("lists and objects within one another, more than " +
-                       std::to_string(limits::kControlDepth) + " deep");
-    if (values > values_max)
-      return Malformed("more than " + std::to_string(values_max) + " values");
-  }
-  return {};
+      shape = Malformed("lists and objects within one another, more than " +
+                        std::to_string(limits::kControlDepth) + " deep");
+    else if (values > values_max)
+      shape = Malformed("more than " + std::to_string(values_max) + " values");
+    return shape.has_value();
+  });
+  return shape;
 }
 
 Result<Json> ParseObject(std::string_view line, std::size_t values_max) {

@@ -134,7 +134,7 @@ Status TakeDesiLayout(const NamedTable& source, const SourceFiles& files, Plate*
     const std::string reason = ReasonOf(&row);
     if (!reason.empty()) Disable(&unit, reason);
     TakeGeometry(columns, *petal, !reason.empty(), &row, &unit.unit);
-    SetGears(files, kDesiGear, kDesiGear, &unit.unit);
+    SetGears(files, kDesiGear, &unit.unit);
     unit.unit.rail = RailId{*petal};
     constexpr std::uint32_t kBusesOfAPetal = 100;
     if (const auto bus = NumberInName(row.Text("bus_id")); bus && *bus < kBusesOfAPetal)

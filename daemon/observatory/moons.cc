@@ -9,32 +9,29 @@
 
 #include "daemon/files/text_file.h"
 #include "fleet/files/cell.h"
+#include "fleet/files/last_line.h"
 
 namespace focalfleet::observatory {
 namespace {
 
 constexpr double kRad = std::numbers::pi / 180;
-constexpr double kMoonsGear = 337.0 * 45 / 17;  // no key has it: that of the layouts made here
 constexpr double kFoldedDeg = 180;
 
 PointFp PlaceOf(double r_mm, double theta_deg) {
   return {r_mm * std::sin(theta_deg * kRad), r_mm * std::cos(theta_deg * kRad)};
 }
 
-/// A number at the end of a file that was cut short would be taken for another.
-Result<std::string> ReadWholeLines(const std::string& path) {
+Result<std::string> ReadWholeFile(const std::string& path) {
   FOCALFLEET_TRY_ASSIGN(std::string text, ReadTextFile(path));
-  if (text.empty() || text.ends_with('\n')) return text;
-  return Fail(ErrorCode::kInvalid, path +
-                                       ": the last line does not end: the file is cut short "
-                                       "(or end it with a newline)");
+  FOCALFLEET_TRY(CheckLastLine(text, path));
+  return text;
 }
 
 /// A parameter file: keys with their values and lines.
 class MoonsParameters {
  public:
   static Result<MoonsParameters> Read(const std::string& path) {
-    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadWholeLines(path));
+    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadWholeFile(path));
     MoonsParameters parameters;
     parameters.file_ = path;
     std::string_view rest = text;
@@ -196,7 +193,7 @@ Status TakeCameras(const MoonsParameters& parameters, Plate* plate) {
 Status TakeMoonsLayout(const std::string& file, const SourceFiles& files, Plate* plate) {
   FOCALFLEET_TRY_ASSIGN(const MoonsParameters parameters, MoonsParameters::Read(file));
   FOCALFLEET_TRY_ASSIGN(Unit common, CommonUnit(parameters));
-  SetGears(files, kMoonsGear, kMoonsGear, &common);
+  SetGears(files, kHexLayoutGear, &common);
   if (files.arm_half_width_mm == 0 && parameters.Has("INS.POS.WIDTH2")) {
     FOCALFLEET_TRY_ASSIGN(const double width_mm, parameters.Number("INS.POS.WIDTH2"));
     common.arm_half_width_mm = width_mm / 2;
@@ -213,7 +210,7 @@ Status TakeMoonsLayout(const std::string& file, const SourceFiles& files, Plate*
 
 /// The lines of targets as a table with a header; both forms become `unit r theta parity priority`.
 Result<NamedTable> ReadTargetLines(const std::string& path, const Plate& plate) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadWholeLines(path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadWholeFile(path));
   std::string csv = "unit,r,theta,parity,priority\n";
   std::string_view rest = text;
   std::size_t row = 0;

@@ -12,8 +12,7 @@ namespace focalfleet::observatory {
 namespace {
 
 constexpr std::int64_t kCobrasOfAModule = 57;
-constexpr double kPfsGear = 337.0 * 45 / 17;  // a Cobra has none: that of the layouts made here
-constexpr double kLongestArm_mm = 10;         // an arm is 2.4 mm; longer ones are in pixels
+constexpr double kLongestArm_mm = 10;  // an arm is 2.4 mm; longer ones are in pixels
 constexpr AnglesDeg kHome{0, 0};
 
 // Bits of Status; bit 0 alone: in order.
@@ -88,7 +87,7 @@ Status TakePfsLayout(const NamedTable& source, const SourceFiles& files, Plate* 
     unit.unit.axis[0].zero_deg = row.Number("CCW_Global_base_ori_z");
     unit.unit.axis[1].zero_deg = stop - 180;
     TakeRanges(&row, &unit.unit);
-    SetGears(files, kPfsGear, kPfsGear, &unit.unit);
+    SetGears(files, kHexLayoutGear, &unit.unit);
     unit.unit.rail = RailId{static_cast<std::uint32_t>(module)};
     unit.unit.bus = BusId{static_cast<std::uint32_t>(module)};
     unit.ids["cobraId"] = std::to_string(unit.unit.id.value);

@@ -235,9 +235,9 @@ void AddUnit(PlateUnit unit, CsvRow* row, Plate* plate) {
   plate->units.push_back(std::move(unit));
 }
 
-void SetGears(const SourceFiles& files, double theta, double phi, Unit* unit) {
-  unit->axis[0].gear = files.gears.empty() ? theta : files.gears.front();
-  unit->axis[1].gear = files.gears.empty() ? phi : files.gears.back();
+void SetGears(const SourceFiles& files, double gear, Unit* unit) {
+  unit->axis[0].gear = files.gears.empty() ? gear : files.gears.front();
+  unit->axis[1].gear = files.gears.empty() ? gear : files.gears.back();
   unit->arm_half_width_mm = files.arm_half_width_mm;
 }
 

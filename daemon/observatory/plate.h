@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "daemon/tables/read_table.h"
+#include "fleet/hex_layout.h"
 #include "fleet/layout.h"
 #include "fleet/targets.h"
 #include "protocol/base/result.h"
@@ -115,7 +116,9 @@ double TurnedInto(double angle_deg, const AxisGeometry& axis);
 void Disable(PlateUnit* unit, const std::string& reason);
 /// Adds a unit, or rejects its row: what FaultOf finds, or an id that is there twice.
 void AddUnit(PlateUnit unit, CsvRow* row, Plate* plate);
-void SetGears(const SourceFiles& files, double theta, double phi, Unit* unit);
+/// Gears and width of the arms as the command gives them; `gear` of both axes where it gives none.
+/// Where a project's files have no gear, it is that of the layouts made here.
+void SetGears(const SourceFiles& files, double gear, Unit* unit);
 /// Disables the units that the tables name by `id_column` or unit_id, with their reasons.
 Status TakeDisabled(const std::vector<NamedTable>& tables, const std::string& id_column,
                     Plate* plate);

@@ -11,7 +11,6 @@
 namespace focalfleet::observatory {
 namespace {
 
-constexpr double kSdssGear = 337.0 * 45 / 17;  // no table has it: that of the layouts made here
 constexpr double kAlphaEndDeg = 360;
 constexpr double kBetaEndDeg = 180;
 constexpr double kNoValue = -999;
@@ -67,7 +66,7 @@ Status TakeSdssLayout(const NamedTable& source, const Holes& holes, const Source
         .zero_deg = row.NumberIn("betaOffset", "deg") + std::atan2(met_y, met_x) * kDegPerRad,
         .min_deg = 0,
         .max_deg = kBetaEndDeg};
-    SetGears(files, kSdssGear, kSdssGear, &unit.unit);
+    SetGears(files, kHexLayoutGear, &unit.unit);
     unit.ids["holeID"] = row.Text("holeID");
     for (const char* column : kOffsets)
       if (row.Has(column)) unit.ids[column] = row.Text(column);

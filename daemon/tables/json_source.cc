@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "fleet/files/csv.h"
+#include "protocol/base/json_marks.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 namespace {
@@ -106,23 +108,12 @@ std::optional<SourceTable> TableOfNamedObjects(const Json& object) {
 /// The byte, from 1, at which values are nested deeper than any table is; 0: nowhere. The parser
 /// and the values' text go as deep as the file does.
 std::size_t TooDeepAt(std::string_view text) {
-  constexpr std::size_t kDepthMost = 64;
-  std::size_t depth = 0;
-  bool in_string = false;
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    const char c = text[at];
-    if (in_string) {
-      if (c == '\\') ++at;
-      if (c == '"') in_string = false;
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '[' || c == '{') {
-      if (++depth > kDepthMost) return at + 1;
-    } else if ((c == ']' || c == '}') && depth > 0) {
-      --depth;
-    }
-  }
-  return 0;
+  std::size_t too_deep_at = 0;
+  ForEachJsonMark(text, [&](char, std::size_t at, std::size_t depth) {
+    if (depth > limits::kTableDepth) too_deep_at = at + 1;
+    return too_deep_at == 0;
+  });
+  return too_deep_at;
 }
 
 std::vector<SourceTable> TablesOf(const Json& root) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fleet/files/cell.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 namespace {
@@ -53,13 +54,11 @@ class TreeBuilder {
   }
 
  private:
-  static constexpr std::size_t kDepthMax = 64;
-
   static TreeBuilder& Of(void* data) { return *static_cast<TreeBuilder*>(data); }
 
   static void Begin(void* data, const XML_Char* name, const XML_Char** attributes) {
     TreeBuilder& self = Of(data);
-    if (self.open_.size() >= kDepthMax) return self.Stop("elements are nested too deep");
+    if (self.open_.size() >= limits::kTableDepth) return self.Stop("elements are nested too deep");
     auto element = std::make_unique<Element>();
     const std::string_view local = std::string_view(name).substr(
         std::string_view(name).find_last_of(':') + 1);  // without its namespace's prefix

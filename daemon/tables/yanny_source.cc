@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "fleet/files/cell.h"
+#include "fleet/files/last_line.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {
@@ -91,10 +92,7 @@ class YannyParser {
   YannyParser(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}
 
   Result<SourceFile> Parse() {
-    if (!text_.ends_with('\n'))
-      return Fail(ErrorCode::kInvalid, name_ +
-                                           ": the last line does not end: the file is cut "
-                                           "short (or end it with a newline)");
+    FOCALFLEET_TRY(CheckLastLine(text_, name_));
     while (at_ < text_.size()) {
       const int line = line_;
       std::string logical = TakeLogicalLine();

@@ -6,6 +6,7 @@
 
 #include "fleet/files/cell.h"
 #include "fleet/files/foreign_format.h"
+#include "fleet/files/last_line.h"
 #include "fleet/files/place.h"
 #include "protocol/base/limits.h"
 
@@ -81,10 +82,7 @@ class CsvParser {
       std::snprintf(reason, sizeof reason, "not a text file (byte 0x%02x)", unsigned{byte});
       return FailAt(line, reason);
     }
-    if (!text_.empty() && text_.back() != '\n')
-      return FailAt(line,
-                    "the last line does not end: the file is cut short (or end it with a newline)");
-    return {};
+    return CheckLastLine(text_, table_.file_);
   }
 
   // Parses up to and including one newline outside quotes. The text is known to end in one.

@@ -34,6 +34,8 @@ inline constexpr std::uint32_t kControlClients = 64;
 inline constexpr std::uint32_t kControlClientsReserved =
     8;                                              // besides those, for clients that send a stop
 inline constexpr std::uint32_t kControlDepth = 16;  // of lists and objects within one another
+inline constexpr std::uint32_t kTableDepth =
+    64;  // the same of a table in JSON, or of elements in XML
 inline constexpr std::uint32_t kControlValues = 2 * kUnits;  // of a request, over all its lists
 inline constexpr std::uint32_t kVerbBytes = 32;
 // Reasons and names, as DDS carries them (focalfleet.idl).

@@ -1,5 +1,5 @@
-// This program does bare_publisher's task through StatusPublisher:   fleet_publisher DOMAIN UNITS
-// CYCLES HZ
+// This program does bare_publisher's task through StatusPublisher:
+//   fleet_publisher DOMAIN UNITS CYCLES HZ [CREDENTIALS]
 #include <sys/resource.h>
 
 #include <chrono>
@@ -21,11 +21,13 @@ double CpuSeconds() {
 }
 
 int Main(int argc, char** argv) {
-  if (argc != 5) return 2;
+  if (argc != 5 && argc != 6) return 2;
   const int cycles = std::atoi(argv[3]);
   const std::chrono::nanoseconds period(1'000'000'000 / std::atoi(argv[4]));
   auto publisher =
-      StatusPublisher::Create({.domain = static_cast<std::uint32_t>(std::atoi(argv[1]))});
+      StatusPublisher::Create({.domain = static_cast<std::uint32_t>(std::atoi(argv[1])),
+                               .config_xml = {},
+                               .security = argc == 6 ? argv[5] : ""});
   if (!publisher) {
     std::fprintf(stderr, "%s\n", publisher.error().text.c_str());
     return 1;

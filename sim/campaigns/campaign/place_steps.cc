@@ -63,9 +63,11 @@ double MostFrequent(std::span<const double> ascending) {
 // Whether more gaps are multiples of the step than chance makes so.
 bool AreMultiples(std::span<const double> gaps, double step) {
   if (!(step > 10 * kSame_mm)) return false;
+  // A gap is between distinct values, so none is zero steps wide: units that stand far apart have
+  // places in clusters, whose gaps are near nothing and near the units' distance.
   std::size_t near = 0;
   for (const double gap : gaps)
-    if (std::abs(std::remainder(gap, step)) <= kNearStep * step) ++near;
+    if (gap > step / 2 && std::abs(std::remainder(gap, step)) <= kNearStep * step) ++near;
   const auto n = static_cast<double>(gaps.size());
   // The gap that has made the step proves nothing, hence n - 1.
   return static_cast<double>(near) >= kMostlyAre * n &&

@@ -130,9 +130,22 @@ class Turns {
   std::size_t rows_ = 0;
 };
 
+/// Below this a turn is none.
+double StallOf_deg(const SeenTurn& turn) {
+  return std::min(kStallShare * std::abs(turn.asked_deg), kLong_deg);
+}
+
+/// Whole turns end at the place where they began, as an axis does that does not turn at all. Such a
+/// move is no evidence of either.
+bool MayBeNone(const SeenTurn& turn) {
+  return std::abs(turn.made_deg) > 180 &&
+         std::abs(std::remainder(turn.made_deg, 360.0)) < StallOf_deg(turn);
+}
+
 AxisReport ReportOf(std::vector<SeenTurn> turns) {
   AxisReport report;
   report.moves = turns.size();
+  std::erase_if(turns, MayBeNone);
   std::size_t long_moves = 0;
   std::vector<double> places;
   for (SeenTurn& turn : turns) {
@@ -144,8 +157,7 @@ AxisReport ReportOf(std::vector<SeenTurn> turns) {
     places.push_back(turn.at_deg);
     if (std::abs(turn.asked_deg) < kLong_deg) continue;
     ++long_moves;
-    if (std::abs(turn.made_deg) < std::min(kStallShare * std::abs(turn.asked_deg), kLong_deg))
-      ++report.stalls;
+    if (std::abs(turn.made_deg) < StallOf_deg(turn)) ++report.stalls;
   }
   report.scale_cw = ScaleOf(turns, -1), report.scale_ccw = ScaleOf(turns, 1);
   report.is = ClassOf(report, long_moves);

@@ -47,11 +47,12 @@ TEST(JsonSource, RefusesWhatIsNoTable) {
   for (const char* text : {"[]", "[1, 2]", "{}", "{\"a\": 1}", "3", R"({"a": [1], "b": [1, 2]})"})
     EXPECT_FALSE(ReadJsonSource(text, "a.json")) << text;
   const std::string deep = std::string(2'000'000, '[') + std::string(2'000'000, ']');
-  for (const std::string& text : {deep, "[{\"a\": " + deep + "}]"}) {
+  const auto error_of = [](const std::string& text) {
     const auto file = ReadJsonSource(text, "a.json");
-    ASSERT_FALSE(file);
-    EXPECT_EQ(file.error().text.substr(0, 30), "a.json: nested too deep, byte ");
-  }
+    return file ? std::string("a table") : file.error().text;
+  };
+  EXPECT_EQ(error_of(deep), "a.json: nested too deep, byte 65");
+  EXPECT_EQ(error_of("[{\"a\": " + deep + "}]"), "a.json: nested too deep, byte 70");
   EXPECT_TRUE(ReadJsonSource("[{\"a\": \"" + std::string(100, '[') + "\"}]", "a.json"));
   EXPECT_EQ(ReadJsonSource("[{\"x\": 1e400}]", "a.json").error().text,
             "a.json: a number that no column can hold");

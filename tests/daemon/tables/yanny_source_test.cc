@@ -61,8 +61,9 @@ TEST(YannySource, RefusesRowsThatDoNotFitWithTheirLine) {
   EXPECT_EQ(ErrorOf("typedef struct {\n int a;\n"),
             "a.par:14: a definition does not end: the file is cut short");
   EXPECT_FALSE(ReadYannySource("#%yanny\nkey 1\n", "a.par"));
-  EXPECT_EQ(ErrorOf("FIBERMAP 1 a A {1 2} {x y}"),
-            "a.par: the last line does not end: the file is cut short (or end it with a newline)");
+  EXPECT_EQ(
+      ErrorOf("FIBERMAP 1 a A {1 2} {x y}"),
+      "a.par:14: the last line does not end: the file is cut short (or end it with a newline)");
 }
 
 TEST(YannySource, IsRecognisedByItsFirstDefinition) {

@@ -45,6 +45,17 @@ TEST(PlaceSteps, AreNotHiddenByAFewOtherPlaces) {
   EXPECT_NEAR(FindPlaceSteps(campaign).x_mm, 0.1, 1e-6);
 }
 
+// Units 100 mm apart, each seen within 8 mm: gaps are near nothing or 92 mm.
+TEST(PlaceSteps, AreNotTheDistancesOfUnitsFarApart) {
+  Rng rng = Rng::Stream(3, "places");
+  std::vector<double> places;
+  for (int unit = 0; unit < 12; ++unit) {
+    places.insert(places.end(), {100.0 * unit - 4, 100.0 * unit + 4});
+    for (int move = 0; move < 57; ++move) places.push_back(100 * unit + rng.Uniform(-4, 4));
+  }
+  EXPECT_EQ(FindStep(places), 0);
+}
+
 TEST(PlaceSteps, OfAFewPlacesAreTheirDigits) {
   EXPECT_NEAR(FindStep(std::vector<double>{1.2, kMissing, 3.4, 5.7}), 0.1, 1e-12);
   EXPECT_EQ(FindStep(std::vector<double>{7, 7, kMissing}), 0);  // a single place shows no step

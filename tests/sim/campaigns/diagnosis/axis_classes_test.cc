@@ -188,6 +188,25 @@ TEST(AxisClasses, EachDirectionHasItsOwnScaleInAClosedLoop) {
     ExpectAsPlanted(robots[0].axis[axis.axis], 0, axis);
 }
 
+// A coordinator that counts a dead axis' turns on, as if it had made the whole ones that were
+// asked.
+TEST(AxisClasses, WholeTurnsOfADeadAxisAreNoTurns) {
+  const std::uint64_t seed = TestSeed(84);
+  FOCALFLEET_TRACE_SEED(seed);
+  std::vector<Robot> robots = {{{StuckAt(25), Healthy()}}};
+  Campaign campaign = CampaignOf(seed, true, &robots);
+  double counted_deg = 0;
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    campaign.from_deg[kTheta][row] += counted_deg;
+    campaign.cmd_deg[kTheta][row] += counted_deg;
+    if (row % 2 == 0) continue;
+    const double whole = row % 4 == 1 ? -360 : 360;
+    campaign.cmd_deg[kTheta][row] = campaign.from_deg[kTheta][row] + 1.12 * whole;
+    counted_deg += whole;
+  }
+  ExpectAsPlanted(robots[0].axis[kTheta], 0, ClassifyAxes(campaign, campaign.units)[kTheta]);
+}
+
 // Only a closed loop knows whole turns.
 TEST(AxisClasses, AnAxisThatEndsWholeTurnsOffIsWrapped) {
   const std::uint64_t seed = TestSeed(83);
