@@ -15,6 +15,7 @@ constexpr Right kRights[] = {
     {"measurements", false, Role::kViewer},
     {"model", false, Role::kViewer},
     {"params", false, Role::kViewer},
+    {"replay", false, Role::kViewer},
     {"select", false, Role::kViewer},
     {"state", false, Role::kViewer},
     {"status", false, Role::kViewer},
@@ -23,6 +24,7 @@ constexpr Right kRights[] = {
     {"stop", true, Role::kViewer},
     {"audit", false, Role::kOperator},
     {"audit_check", false, Role::kOperator},
+    {"diagnose", false, Role::kOperator},
     // A dry run takes the planner's time.
     {"preview", false, Role::kOperator},
     {"alarms_ack", true, Role::kOperator},

@@ -57,7 +57,7 @@ HttpAnswer Ask(const std::string& socket, const std::string& verb, const HttpReq
 void AddApiRoutes(const std::string& socket, HttpRouter* router) {
   for (const Right& right : Rights()) {
     const std::string verb = right.verb;
-    if (verb == "wait") continue;
+    if (verb == "wait" || verb == "diagnose") continue;
     router->Add({.method = "POST",
                  .path = "/api/" + verb,
                  .verb = verb,

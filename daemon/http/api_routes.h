@@ -5,6 +5,7 @@
 //   200 the result    400 invalid    403 the role does not suffice    409 refused now
 //   429 full          503 unavailable
 //
+// `diagnose` is not among them: the page has routes of its own for it, and the core no part in it.
 // `wait` is not among them, nor the argument of that name: a page asks for the status instead of
 // holding a connection.
 #pragma once

@@ -157,8 +157,10 @@ void Shell::SubmitPlan(PlanJob job) {
   if (!preview && preview_given_up_ != nullptr) *preview_given_up_ = true;
   if (preview) preview_given_up_ = std::make_shared<std::atomic<bool>>(false);
   const auto drives = parts_.coordinator->drives();
-  PlannerWork work{
-      std::move(job), {drives.begin(), drives.end()}, preview ? preview_given_up_ : nullptr};
+  PlannerWork work{std::move(job),
+                   {drives.begin(), drives.end()},
+                   preview ? preview_given_up_ : nullptr,
+                   parts_.coordinator->configuration().id};
   if (parts_.planner->Submit(&work)) return;
   if (preview) return parts_.handler->RefusePreview();
   not_done_plans_.push_back(

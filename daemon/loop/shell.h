@@ -36,6 +36,7 @@ struct PlannerWork {
   std::vector<UnitDrive> drives;
   /// A preview alone has it: true once a configuration is to be planned first.
   std::shared_ptr<const std::atomic<bool>> given_up = nullptr;
+  std::uint64_t configuration = 0;  // under way when the job was given
 };
 using PlannerQueue = JobQueue<PlannerWork, PlanDone>;
 using CameraQueue = JobQueue<CameraWork, ExposureDone>;

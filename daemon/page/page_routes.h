@@ -1,15 +1,27 @@
 // The routes of the operators' page. The page's own files are for everybody, because they show
-// nothing of the fleet. Layout and stream take the right to ask for the status. Everything else
-// that the page does goes through the verbs of /api (http/api_routes.h).
+// nothing of the fleet. Layout, stream and curves take the right to ask for the status, motions of
+// plans that of history, the motion of a preview that to make one. None of them asks the core.
+// Everything else that the page does goes through the verbs of /api (http/api_routes.h).
 #pragma once
 
 #include "daemon/http/router.h"
+#include "daemon/page/diagnosis_job.h"
+#include "daemon/page/kept_plans.h"
+#include "daemon/page/night_curves.h"
 #include "daemon/page/plate_feed.h"
 #include "fleet/layout.h"
 
 namespace focalfleet {
 
-/// Both outlive the router.
-void AddPageRoutes(const Layout* layout, PlateFeed* feed, HttpRouter* router);
+/// The parts that the page shows. All outlive the router.
+struct PageParts {
+  const Layout* layout = nullptr;
+  PlateFeed* feed = nullptr;
+  const KeptPlans* plans = nullptr;
+  const NightCurves* night = nullptr;
+  DiagnosisJob* diagnosis = nullptr;
+};
+
+void AddPageRoutes(const PageParts& parts, HttpRouter* router);
 
 }  // namespace focalfleet

@@ -16,6 +16,7 @@
 #include "daemon/loop/event_loop.h"
 #include "daemon/metrics/metrics_endpoint.h"
 #include "daemon/metrics/metrics_sampler.h"
+#include "daemon/page/plan_motion.h"
 #include "daemon/process/bounded_end.h"
 #include "daemon/process/caught_jobs.h"
 #include "daemon/process/control_door.h"
@@ -71,6 +72,7 @@ struct Measuring {
 struct Doors {
   AuditTrail audit;
   std::unique_ptr<RequestHandler> handler;
+  std::unique_ptr<DiagnosisJob> diagnosis;
   std::unique_ptr<HttpServer> http;  // none: [http] has no port
 };
 
@@ -122,6 +124,7 @@ class Daemon {
   void ServeMetrics();
   PlanDone Plan(const PlannerWork& work, const std::atomic<bool>& ending,
                 const std::function<void()>& alive);
+  void KeepForPages(const PlannerWork& work, const struct Plan& plan);
   Status OpenCamera();
   ShellFacts Facts() const;
 
@@ -326,8 +329,11 @@ Status Daemon::StartThreads() {
                                                   .threads = signal_.get(),
                                                   .hang_up = &ReopenLog}));
   ServeMetrics();
-  FOCALFLEET_TRY_ASSIGN(
-      doors_.http, OpenHttp(config_.http, config_.control.socket, *layout_, status_.page.get()));
+  doors_.diagnosis = std::make_unique<DiagnosisJob>(DiagnosisJob::Options{
+      .programs = StudyPrograms(), .folder = config_.store.path + ".diagnosis"});
+  FOCALFLEET_TRY_ASSIGN(doors_.http, OpenHttp(config_.http, config_.control.socket,
+                                              {layout_.get(), status_.page.get(), &status_.plans,
+                                               &status_.night, doors_.diagnosis.get()}));
   return {};
 }
 
@@ -339,7 +345,21 @@ PlanDone Daemon::Plan(const PlannerWork& work, const std::atomic<bool>& ending,
   if (metrics_.sampler != nullptr && done.plan && !done.plan->moves.empty())
     metrics_.power.Put(
         std::make_unique<const PlannedPower>(PowerOf(*done.plan, work.job, *layout_, work.drives)));
+  if (status_.page != nullptr && done.plan && !done.plan->moves.empty())
+    KeepForPages(work, *done.plan);
   return done;
+}
+
+/// Pages get the plan from here, and the core has no part in it.
+void Daemon::KeepForPages(const PlannerWork& work, const struct Plan& plan) {
+  std::string motion = EncodeMotion(plan, *layout_, work.drives);
+  if (work.job.purpose == PlanPurpose::kPreview)
+    return status_.plans.PutPreview(work.job.job, std::move(motion));
+  status_.plans.Put(work.configuration, std::move(motion));
+  PlanPower power = PowerOverTime(plan, work.job, *layout_, work.drives);
+  power.configuration = work.configuration;
+  power.at = WallTime::Now();
+  status_.night.Take(std::move(power));
 }
 
 void Daemon::OpenService() {

@@ -11,7 +11,6 @@
 #include "daemon/access/token.h"
 #include "daemon/clock/wall_time.h"
 #include "daemon/http/api_routes.h"
-#include "daemon/page/page_routes.h"
 
 namespace focalfleet {
 namespace {
@@ -63,8 +62,7 @@ std::string PageAddress(const DaemonConfig::Http& http) {
 }
 
 Result<std::unique_ptr<HttpServer>> OpenHttp(const DaemonConfig::Http& http,
-                                             const std::string& socket, const Layout& layout,
-                                             PlateFeed* feed) {
+                                             const std::string& socket, const PageParts& page) {
   if (http.port == 0) return std::unique_ptr<HttpServer>();
   FOCALFLEET_TRY(CheckTokens(http));
   std::shared_ptr<TlsContext> tls;
@@ -78,7 +76,7 @@ Result<std::unique_ptr<HttpServer>> OpenHttp(const DaemonConfig::Http& http,
       .viewer_without_token = http.viewer_without_token,
       .log = [log](const std::string& text) { (*log)(text); }});
   AddApiRoutes(socket, router.get());
-  AddPageRoutes(&layout, feed, router.get());
+  AddPageRoutes(page, router.get());
   std::vector<std::string> names = http.names;
   names.push_back(http.address);
   return std::make_unique<HttpServer>(

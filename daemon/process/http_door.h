@@ -6,7 +6,7 @@
 #include <string>
 
 #include "daemon/http/http_server.h"
-#include "daemon/page/plate_feed.h"
+#include "daemon/page/page_routes.h"
 #include "daemon/process/config.h"
 #include "protocol/base/result.h"
 
@@ -20,9 +20,8 @@ Status CheckHttpDoor(const DaemonConfig::Http& http);
 std::string PageAddress(const DaemonConfig::Http& http);
 
 /// The server listens, or tries to; null where there is no port. `socket` is the control socket's
-/// path. Lifetime: layout and feed outlive the server. Errors: as CheckHttpDoor.
+/// path. Lifetime: the page's parts outlive the server. Errors: as CheckHttpDoor.
 Result<std::unique_ptr<HttpServer>> OpenHttp(const DaemonConfig::Http& http,
-                                             const std::string& socket, const Layout& layout,
-                                             PlateFeed* feed);
+                                             const std::string& socket, const PageParts& page);
 
 }  // namespace focalfleet

@@ -49,8 +49,9 @@ Status StartStatusThread(std::function<void()> room, std::function<void()> alive
   RenewingStatusPublisher* const publisher = out->publisher.get();
   PlateFeed* const page = out->page.get();
   StatusThread::Sinks sinks;
-  sinks.publish = [publisher, page](const StatusBatch& status) {
+  sinks.publish = [publisher, page, night = &out->night](const StatusBatch& status) {
     if (page != nullptr) page->Take(status);
+    if (page != nullptr) night->Take(status);
     return publisher != nullptr && publisher->Publish(status);
   };
   sinks.alarm = [publisher, page](const AlarmValue& alarm) {

@@ -7,6 +7,8 @@
 
 #include "daemon/clock/clock.h"
 #include "daemon/loop/status_thread.h"
+#include "daemon/page/kept_plans.h"
+#include "daemon/page/night_curves.h"
 #include "daemon/page/plate_feed.h"
 #include "daemon/process/bounded_end.h"
 #include "daemon/process/config.h"
@@ -22,6 +24,8 @@ struct StatusOutput {
   std::unique_ptr<DdsTroubles> troubles;
   std::unique_ptr<RenewingStatusPublisher> publisher;  // none: DDS is off
   std::unique_ptr<CredentialWatch> credentials;        // none: no DDS Security
+  KeptPlans plans;                                     // empty where there is no HTTP door
+  NightCurves night;                                   // likewise
   std::unique_ptr<PlateFeed> page;                     // none: there is no HTTP door
   std::unique_ptr<StatusScheduler> scheduler;          // none: neither publisher nor page
   std::unique_ptr<StatusThread> thread;  // none: the same. Ends before publisher and page

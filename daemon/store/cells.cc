@@ -3,6 +3,16 @@
 #include <cmath>
 
 namespace focalfleet::store_internal {
+namespace {
+
+AxisKnowledge HullAt(Cells& cells, int column) {
+  const AxisKnowledge hull{Witness::kInterval, cells.Whole<std::int32_t>(column),
+                           cells.Whole<std::int32_t>(column + 1)};
+  cells.Require(hull.low <= hull.high, "low is above high");
+  return hull;
+}
+
+}  // namespace
 
 void Cells::Fault(const std::string& what) {
   if (error_) return;
@@ -149,6 +159,36 @@ std::optional<FibreCarrierReading> ReadFibreCarrier(Cells& cells, int first) {
   const char* flaw = Flaw(carrier);
   cells.Require(flaw == nullptr, flaw == nullptr ? "" : flaw);
   return carrier;
+}
+
+ConfigurationHistory ReadConfigurationHistory(Cells& cells) {
+  ConfigurationHistory entry;
+  entry.row = ReadConfiguration(cells);
+  entry.began = cells.Time(15);
+  entry.changed = cells.Time(16);
+  return entry;
+}
+
+MoveHistory ReadMove(Cells& cells) {
+  const auto vectors = [&cells](int column) { return cells.Whole<std::int32_t>(column); };
+  MoveHistory move;
+  move.entry = cells.Whole<std::uint64_t>(0);
+  move.configuration = cells.Whole<std::uint64_t>(1);
+  move.unit = {cells.Whole<std::uint32_t>(2)};
+  move.serial = cells.Serial(3);
+  move.move = {cells.Whole<std::uint16_t>(4)};
+  move.from = {vectors(5), vectors(6)};
+  move.to = {vectors(7), vectors(8)};
+  move.hull = {HullAt(cells, 9), HullAt(cells, 11)};
+  move.began = cells.Time(13);
+  if (cells.IsNull(15)) return move;
+  move.ended = cells.Time(14);
+  move.end = cells.Code(15, kLastIntentEnd);
+  // Where knowledge of the unit was never written, its place at the end is unknown.
+  if (!cells.IsNull(16) && !cells.IsNull(19)) {
+    move.ended_at = UnitKnowledge{cells.Knowledge(16), cells.Knowledge(19)};
+  }
+  return move;
 }
 
 }  // namespace focalfleet::store_internal

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "daemon/clock/wall_time.h"
+#include "daemon/store/history.h"
 #include "daemon/store/sqlite.h"
 #include "fleet/knowledge.h"
 #include "fleet/records.h"
@@ -71,6 +72,20 @@ class Cells {
 /// makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, in
 /// this order from column 0 on.
 ConfigurationRow ReadConfiguration(Cells& cells);
+
+/// The columns of a configuration with its times, for ReadConfigurationHistory.
+inline constexpr const char* kConfigurationColumns =
+    "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
+    "makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, "
+    "began_ns, changed_ns FROM configuration ";
+ConfigurationHistory ReadConfigurationHistory(Cells& cells);
+
+/// The columns of a move, for ReadMove.
+inline constexpr const char* kMoveColumns =
+    "SELECT entry, configuration, unit_id, serial, move, theta_from, phi_from, theta_to, phi_to, "
+    "theta_low, theta_high, phi_low, phi_high, began_ns, ended_ns, end, theta_end_witness, "
+    "theta_end_low, theta_end_high, phi_end_witness, phi_end_low, phi_end_high FROM intent ";
+MoveHistory ReadMove(Cells& cells);
 
 /// The columns serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision,
 /// mode, origin, in this order from column `first` on.

@@ -37,6 +37,7 @@ struct MoveHistory {
   std::optional<WallTime> ended;          // none: the intent is open
   std::optional<IntentEnd> end;           // present with `ended`
   std::optional<UnitKnowledge> ended_at;  // knowledge of the unit at the end
+  std::uint64_t entry = 0;                // number in the store
 };
 
 struct ConfigurationHistory {
@@ -92,6 +93,22 @@ struct AuditFilter {
   std::string name = {};  // of the caller; empty: all
   std::string verb = {};  // empty: all
   std::uint32_t limit = 1000;
+};
+
+/// The distance of a unit from its target in an exposure.
+struct MeasuredError {
+  UnitId unit;
+  double error_um = 0;
+};
+
+/// A page of what the store has of one configuration.
+struct ReplayPage {
+  std::optional<ConfigurationHistory> configuration;  // none: there is none of that number
+  std::vector<MoveHistory> moves;                     // the oldest first
+  bool more = false;                                  // moves follow the last of these
+  // The last exposure of the configuration, with the first page only.
+  std::uint64_t exposure = 0;  // 0: it was never measured
+  std::vector<MeasuredError> errors = {};
 };
 
 struct MeasurementHistory {

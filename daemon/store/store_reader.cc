@@ -58,34 +58,6 @@ struct Conditions {
   }
 };
 
-AxisKnowledge Hull(Cells& cells, int column) {
-  const AxisKnowledge hull{Witness::kInterval, cells.Whole<std::int32_t>(column),
-                           cells.Whole<std::int32_t>(column + 1)};
-  cells.Require(hull.low <= hull.high, "low is above high");
-  return hull;
-}
-
-MoveHistory ReadMove(Cells& cells) {
-  const auto vectors = [&cells](int column) { return cells.Whole<std::int32_t>(column); };
-  MoveHistory move;
-  move.configuration = cells.Whole<std::uint64_t>(1);
-  move.unit = {cells.Whole<std::uint32_t>(2)};
-  move.serial = cells.Serial(3);
-  move.move = {cells.Whole<std::uint16_t>(4)};
-  move.from = {vectors(5), vectors(6)};
-  move.to = {vectors(7), vectors(8)};
-  move.hull = {Hull(cells, 9), Hull(cells, 11)};
-  move.began = cells.Time(13);
-  if (cells.IsNull(15)) return move;
-  move.ended = cells.Time(14);
-  move.end = cells.Code(15, kLastIntentEnd);
-  // Where knowledge of the unit was never written, its place at the end is unknown.
-  if (!cells.IsNull(16) && !cells.IsNull(19)) {
-    move.ended_at = UnitKnowledge{cells.Knowledge(16), cells.Knowledge(19)};
-  }
-  return move;
-}
-
 static_assert(IsOver(ConfigurationState{3}) && !IsOver(ConfigurationState{2}));
 constexpr const char* kIsOver = "AND state >= 3 ";
 constexpr const char* kLastEnded =
@@ -96,19 +68,9 @@ Result<std::vector<ConfigurationHistory>> QueryConfigurations(Connection& connec
                                                               const std::string& order,
                                                               std::uint32_t limit) {
   const std::string sql =
-      "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
-      "makespan_s, energy_J, "
-      "peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, began_ns, changed_ns "
-      "FROM configuration " +
-      conditions.where + "ORDER BY id " + order + " LIMIT ?1";
+      std::string(kConfigurationColumns) + conditions.where + "ORDER BY id " + order + " LIMIT ?1";
   return Query<ConfigurationHistory>(connection, "configuration", sql.c_str(), limit,
-                                     conditions.filters, [](Cells& cells) {
-                                       ConfigurationHistory entry;
-                                       entry.row = ReadConfiguration(cells);
-                                       entry.began = cells.Time(15);
-                                       entry.changed = cells.Time(16);
-                                       return entry;
-                                     });
+                                     conditions.filters, ReadConfigurationHistory);
 }
 
 Result<std::vector<AlarmHistory>> QueryAlarms(Connection& connection, const Conditions& conditions,
@@ -170,17 +132,12 @@ Result<StoredFleet> StoreReader::Load() { return LoadFleet(*connection_); }
 Result<std::vector<MoveHistory>> StoreReader::Moves(std::optional<UnitId> unit, std::uint32_t limit,
                                                     const Period& period,
                                                     std::optional<IntentEnd> end) {
-  static const std::string kColumns =
-      "SELECT entry, configuration, unit_id, serial, move, theta_from, phi_from, theta_to, phi_to, "
-      "theta_low, "
-      "theta_high, phi_low, phi_high, began_ns, ended_ns, end, theta_end_witness, theta_end_low, "
-      "theta_end_high, "
-      "phi_end_witness, phi_end_low, phi_end_high FROM intent ";
   Conditions conditions;
   conditions.Add(unit);
   conditions.Add(period, "began_ns");
   if (end) conditions.Add("end =", static_cast<std::int64_t>(*end));
-  const std::string sql = kColumns + conditions.where + "ORDER BY entry DESC LIMIT ?1";
+  const std::string sql =
+      std::string(kMoveColumns) + conditions.where + "ORDER BY entry DESC LIMIT ?1";
   return Query<MoveHistory>(*connection_, "intent", sql.c_str(), limit, conditions.filters,
                             ReadMove);
 }

@@ -43,6 +43,9 @@ class StoreReader {
   /// The period is that of their last change.
   Result<std::vector<ConfigurationHistory>> Configurations(
       std::uint32_t limit, const Period& period = {}, std::optional<ConfigurationState> state = {});
+  /// All that one configuration left: moves with entries after `after`, at most `limit`, the oldest
+  /// first; 0 begins. Cost: O(limit + log of all moves), plus a row for each unit measured.
+  Result<ReplayPage> Replay(std::uint64_t configuration, std::uint64_t after, std::uint32_t limit);
   Result<std::vector<ParameterHistory>> Parameters(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<TuningHistory>> Tunings(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit, const Period& period = {});

@@ -20,6 +20,7 @@ Json PreviewJson(const FleetView& view, const PlanDone& done, std::uint32_t targ
   for (auto& [unit_id, reason] : reasons)
     rows.push_back({{"unit_id", unit_id}, {"outcome", "refused"}, {"reason", std::move(reason)}});
   return {{"dry_run", true},
+          {"plan", done.job},
           {"targeted", targeted},
           {"served", targeted - reasons.size()},
           {"moving", plan.moves.size()},

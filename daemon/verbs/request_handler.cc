@@ -11,6 +11,7 @@
 #include "daemon/verbs/history_requests.h"
 #include "daemon/verbs/model_upkeep.h"
 #include "daemon/verbs/preview_json.h"
+#include "daemon/verbs/replay_request.h"
 #include "daemon/verbs/requested_command.h"
 #include "daemon/verbs/unit_selection.h"
 #include "fleet/files/bad_rows.h"
@@ -54,6 +55,7 @@ std::optional<Result<StoreReading>> AskStore(const FleetView& view, const Contro
   if (request.verb == "events") return AskEvents(request, view);
   if (request.verb == "alarms") return AskAlarms(request, alarms, view.at);
   if (request.verb == "measurements") return AskMeasurements(request, view);
+  if (request.verb == "replay") return AskReplay(request, view);
   return std::nullopt;
 }
 
@@ -355,6 +357,7 @@ Status RequestHandler::Plan(const FleetView& view, const ControlRequest& request
               .refused = std::move(preview.refused),
               .since = view.now};
   preview_job_ = std::move(preview.job);
+  preview_job_->job = next_request_++;  // names the plan for those who want to see its motion
   return {};
 }
 

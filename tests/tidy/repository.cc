@@ -32,8 +32,11 @@ Files Repository() {
     if (top.is_regular_file() && name != ".git") read(top.path());
     if (!top.is_directory() || folders.count(name) == 0) continue;
     for (const auto& entry : fs::recursive_directory_iterator(top.path())) {
-      const bool data = entry.path().string().find("/corpus/") != std::string::npos ||
-                        entry.path().string().find("/data/") != std::string::npos;
+      const std::string path = entry.path().string();
+      const auto is_in = [&](const char* part) { return path.find(part) != std::string::npos; };
+      // Files of others follow their rules; what this project says about them follows its own.
+      const bool foreign = is_in("/third_party/") && !EndsWith(path, "/README.md");
+      const bool data = is_in("/corpus/") || is_in("/data/") || foreign;
       if (entry.is_regular_file() && !data) read(entry.path());
     }
   }

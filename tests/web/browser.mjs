@@ -58,7 +58,12 @@ export async function isLive(tab) {
 
 export async function textOf(tab, selector, pattern) {
   const found = tab.locator(selector, {hasText: pattern});
-  await found.waitFor();
+  try {
+    await found.waitFor();
+  } catch {
+    const there = await tab.locator(selector).allInnerTexts();
+    assert.fail(`${selector} does not say ${pattern}, but: ${there.join(" | ")}`);
+  }
   return found.innerText();
 }
 

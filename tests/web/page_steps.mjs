@@ -3,6 +3,8 @@
 import {readFileSync} from "node:fs";
 import {assert, axeFindings, coloursOf, dropFile, given, isLive, openTab, signIn, textOf,
   withBrowser, world} from "./browser.mjs";
+import {past, study, tabs} from "./past_steps.mjs";
+import {tasks} from "./task_steps.mjs";
 
 const targets = () => readFileSync(given.targets, "utf8");
 const say = (text) => process.stdout.write(`${text}\n`);
@@ -144,11 +146,41 @@ async function looks(browser) {
         stop.y + stop.height <= height, `stop is in view: ${JSON.stringify(stop)}`);
       assert.deepEqual(await axeFindings(tab), []);
       await tab.screenshot({path: `${given.out}/${name}-${colorScheme}.png`});
+      await sheets(tab, `${name}-${colorScheme}`, name === "desktop" || colorScheme === "dark");
+      if (name === "phone") await player(tab, colorScheme);
       if (name === "desktop") await closer(tab, colorScheme);
       assert.deepEqual(tab.faults, []);
       await tab.context().close();
     }
   }
+}
+
+/** Pictures of the other views, with stop in each of them. */
+async function sheets(tab, name, withAxe) {
+  for (const sheet of ["curves", "nights", "model", "diagnosis", "camera"]) {
+    await tab.click(`#show-${sheet}`);
+    await tab.locator(`#sheet-${sheet}`).waitFor();
+    if (sheet === "curves") await tab.locator("#curves .chart canvas").first().waitFor();
+    if (withAxe) assert.deepEqual(await axeFindings(tab), []);
+    assert.ok(await tab.locator("#stop").isVisible());
+    const wide = await tab.evaluate(() => document.documentElement.scrollWidth -
+      document.documentElement.clientWidth);
+    assert.ok(wide <= 0, `${sheet} is wider than the screen by ${wide} px`);
+    await tab.screenshot({path: `${given.out}/${sheet}-${name}.png`});
+  }
+  await tab.click("#show-plate");
+}
+
+/** The plan of a preview on a small screen. */
+async function player(tab, colorScheme) {
+  await dropFile(tab, "targets.csv", targets());
+  await tab.click("#play-preview");
+  await textOf(tab, "#player-title", "nothing moves");
+  await tab.locator("#plate").scrollIntoViewIfNeeded();
+  await tab.evaluate(() => window.scrollTo(0, 0));
+  assert.deepEqual(await axeFindings(tab), []);
+  await tab.screenshot({path: `${given.out}/player-${colorScheme}.png`});
+  await tab.click("#player-close");
 }
 
 /** Pictures of the near view, a preview, and other colours. */
@@ -173,7 +205,7 @@ async function closer(tab, colorScheme) {
   await tab.screenshot({path: `${given.out}/preview-${colorScheme}.png`});
 }
 
-const scenarios = {night, looks};
+const scenarios = {night, looks, past, study, tabs, tasks};
 await withBrowser((browser) => scenarios[given.scenario](browser));
 say("done");
 process.exit(0);

@@ -2,19 +2,23 @@
 
   page_test.py PROGRAMS NODE_FOLDER OUT_FOLDER SCENARIO
 
-SCENARIO: night or looks. The steps are in page_steps.mjs; they ask here for what the
+SCENARIO: night, looks, past, study, tabs or tasks. The steps are in page_steps.mjs, past_steps.mjs and task_steps.mjs; they ask here for what the
 world around the page does: the daemon ends, comes back, a bus dies.
 """
 
+import csv
 import json
 import pathlib
+import sqlite3
 import subprocess
 import sys
 
 from web_fleet import WebFleet
 
+DAY_NS = 86_400_000_000_000
 HERE = pathlib.Path(__file__).resolve().parent
-COUNTS = {"night": 120, "looks": 5000}
+COUNTS = {"night": 120, "looks": 5000, "past": 120, "study": 19, "tabs": 37, "tasks": 120}
+PLACES = {"tabs": 3}  # for viewers
 
 
 def world(fleet, line):
@@ -24,6 +28,13 @@ def world(fleet, line):
         fleet.stop_daemon()
     elif word == "start-daemon":
         fleet.start_daemon("heard")  # a unit has a fault
+    elif word == "disable":
+        fleet.cli("disable", arguments[0], "--reason", "its gear is worn")
+    elif word == "yesterday":  # what the store has so far was a day before
+        fleet.stop_daemon()
+        with sqlite3.connect(fleet.folder / "focalfleet.db") as store:
+            store.execute(f"UPDATE configuration SET began_ns = began_ns - {DAY_NS}, changed_ns = changed_ns - {DAY_NS}")
+        fleet.start_daemon("heard")
     elif word == "fault":
         fleet.sim("fault", "--units", arguments[0], "--code", "over_temperature")
     elif word == "revoke":
@@ -36,8 +47,36 @@ def world(fleet, line):
         raise AssertionError(f"nobody knows {line}")
 
 
+def table(path):
+    with open(path, encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def make_campaign(fleet):
+    """A campaign with backlash, whose k-th unit is at the place of the fleet's k-th."""
+    folder = fleet.folder / "campaign"
+    fleet.cli("simulate", "campaign", "--units", fleet.count, "--moves", 40, "--effect", "backlash:theta=0.1",
+              "--out", folder, "--quiet")  # fmt: skip
+    there = table(fleet.folder / "units.csv")
+    units, moves = table(folder / "units.csv"), table(folder / "moves.csv")
+    onto = {}
+    for made, real in zip(units, there):
+        onto[made["unit_id"]] = (real["unit_id"], *(float(real[axis]) - float(made[axis])
+                                                    for axis in ("base_x_mm", "base_y_mm")))  # fmt: skip
+    for rows, name, columns in ((units, "units", ("base_x_mm", "base_y_mm")), (moves, "moves", ("x_mm", "y_mm"))):
+        for row in rows:
+            row["unit_id"], *shift = onto[row["unit_id"]]
+            row |= {column: float(row[column]) + by for column, by in zip(columns, shift)}
+        with open(folder / f"{name}.csv", "w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, rows[0], lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+    return folder
+
+
 def run(fleet, node_folder, out, scenario):
-    given = {"url": fleet.url, "tokens": fleet.tokens, "targets": str(fleet.folder / "targets.csv"),
+    campaign = make_campaign(fleet) if scenario == "study" else ""
+    given = {"campaign": str(campaign), "url": fleet.url, "tokens": fleet.tokens, "targets": str(fleet.folder / "targets.csv"),
              "nodeFolder": str(node_folder), "out": str(out), "scenario": scenario, "pid": fleet.daemon.pid,
              "count": fleet.count}  # fmt: skip
     steps = subprocess.Popen(["node", HERE / "page_steps.mjs", json.dumps(given)], stdin=subprocess.PIPE,
@@ -60,7 +99,8 @@ def main():
     programs, node_folder, out, scenario = sys.argv[1:5]
     out = pathlib.Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    with WebFleet(programs, COUNTS[scenario], speed=4) as fleet:
+    http = f"viewers_max = {PLACES.get(scenario, 16)}\n"
+    with WebFleet(programs, COUNTS[scenario], speed=4, http=http, camera=scenario == "study") as fleet:
         return run(fleet, pathlib.Path(node_folder).resolve(), out.resolve(), scenario)
 
 

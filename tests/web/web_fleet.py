@@ -30,7 +30,7 @@ class WebFleet(SimulatedFleet):
 
     def _prepare(self):
         super()._prepare()
-        for role in ("viewer", "operator"):
+        for role in ("viewer", "operator", "engineer"):
             made = self.cli("token", "add", f"{role}-page", "--role", role, "--days", 1, "--file", "tokens.csv", "--json")
             self.tokens[role] = token_in(made)
         config = self.folder / "focalfleet.toml"

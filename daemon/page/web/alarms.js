@@ -8,6 +8,15 @@ const kPeriod_ms = 10_000;  // others acknowledge, too
 const kRanks = {error: 0, warning: 1, info: 2};
 const kUnitsNamed = 8;
 
+/** Seconds until it is that time of day in UTC: today, or tomorrow. Units: s. */
+export function secondsUntil(time, now_ms) {
+  const [hours, minutes] = time.split(":").map(Number);
+  const at = new Date(now_ms);
+  at.setUTCHours(hours, minutes, 0, 0);
+  const rest_s = Math.ceil((at.getTime() - now_ms) / 1000);  // not a second too early
+  return rest_s > 0 ? rest_s : rest_s + 24 * 3600;
+}
+
 /** Alarms of one name and state, as one entry. */
 function fold(alarms) {
   const entries = new Map();
@@ -142,22 +151,40 @@ export class Alarms {
   }
 
   actionsOf(entry) {
+    // The list is made anew when an alarm comes: what is half typed must not be gone then.
+    const draft = this.drafts.get(entry.name) ?? {reason: "", period: "3600", until: ""};
+    this.drafts.set(entry.name, draft);
     const reason = make("input", {size: 16, "aria-label": "Reason to mute",
-      placeholder: "reason", value: this.drafts.get(entry.name) ?? ""});
-    reason.addEventListener("input", () => this.drafts.set(entry.name, reason.value));
+      placeholder: "reason", value: draft.reason});
+    reason.addEventListener("input", () => { draft.reason = reason.value; });
     const period = make("select", {"aria-label": "How long it is muted"},
-        ...[["1 h", 3600], ["4 h", 14400], ["12 h", 43200]].map(([text, seconds]) =>
-          make("option", {value: String(seconds)}, text)));
+        ...[["1 h", "3600"], ["4 h", "14400"], ["12 h", "43200"], ["until, UTC", "until"]]
+          .map(([text, seconds]) => make("option", {value: seconds}, text)));
+    period.value = draft.period;
+    const until = make("input", {type: "time", "aria-label": "Muted until, UTC",
+      hidden: period.value !== "until", value: draft.until});
+    until.addEventListener("input", () => { draft.until = until.value; });
+    period.addEventListener("change", () => {
+      draft.period = period.value;
+      until.hidden = period.value !== "until";
+      if (!until.hidden) until.focus();
+    });
     const trouble = make("span", {class: "trouble", role: "status"});
     const mute = make("button", {type: "button", onclick: async () => {
       if (reason.value.trim() === "") {
         setText(trouble, "Give a reason: others will wonder.");
         return reason.focus();
       }
-      await this.change(trouble, "alarms_mute", {name: entry.name, for_s: Number(period.value),
+      if (period.value === "until" && until.value === "") {
+        setText(trouble, "Until when?");
+        return until.focus();
+      }
+      const for_s = period.value === "until" ? secondsUntil(until.value, Date.now())
+        : Number(period.value);
+      await this.change(trouble, "alarms_mute", {name: entry.name, for_s,
         reason: reason.value.trim()});
     }}, "Mute");
-    return make("div", {class: "buttons"}, period, reason, this.access.guard(mute, "alarms_mute"),
+    return make("div", {class: "buttons"}, period, until, reason, this.access.guard(mute, "alarms_mute"),
         trouble);
   }
 

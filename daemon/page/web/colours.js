@@ -86,6 +86,19 @@ export function makeThemes(fleet, now_ms) {
   };
 }
 
+/** The themes of a film, which says nothing of knowledge and age. */
+export function makeFilmThemes(film, themes) {
+  return {
+    state: {...themes.state, indexOf: (u) => film.state[u]},
+    error: {...themes.error, title: "Measured distance from target", indexOf: (u) => {
+      const value = film.error_um[u];
+      return Number.isNaN(value) ? kErrorLimits_um.length + 1 : classOf(value, kErrorLimits_um);
+    }},
+    bus: themes.bus,
+    rail: themes.rail,
+  };
+}
+
 const kNames = ["paper", "plate", "ink", "muted", "grid", "link", "obstacle", "pair", "none",
   ...kStates.map(({name}) => name), ...kSeries, "q0", "q1", "q2", "q3", "q4", "q5"];
 

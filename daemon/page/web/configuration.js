@@ -1,6 +1,9 @@
 // A configuration from file to result: preview, apply, progress, and what came of it.
 
-import {counted, duration, find, make, micrometres, setText} from "/page/dom.js";
+import {stateOf} from "/page/colours.js";
+import {counted, duration, find, make, micrometres, set, setText} from "/page/dom.js";
+import {filmOfPreview} from "/page/film.js";
+import {motionsIn} from "/page/motion.js";
 
 const kFileBytesMax = 12 << 20;
 const kUnservedShown = 8;
@@ -17,10 +20,11 @@ function byReason(rows) {
 }
 
 export class Configuration {
-  constructor(api, access, plate, onUnit) {
-    Object.assign(this, {api, access, plate, onUnit});
+  constructor(api, access, plate, player, onUnit) {
+    Object.assign(this, {api, access, plate, player, onUnit});
     this.facts = null;
     this.file = null;
+    this.isShown = false;  // its plan is on the plate
     this.resultOf = "";  // the configuration whose result is shown
     find("choose-file").addEventListener("click", () => find("file").click());
     find("file").addEventListener("change", () => {
@@ -57,6 +61,7 @@ export class Configuration {
     this.file = null;
     this.plate.marked = [];
     this.plate.dirty = true;
+    if (this.isShown) this.player.close();
     this.say();
   }
 
@@ -73,6 +78,7 @@ export class Configuration {
       return;
     }
     this.file = {source: file.name, targets_csv: await file.text()};
+    if (this.isShown) this.player.close();
     this.say(make("p", {}, `${file.name}: a way is being planned. Nothing moves …`));
     try {
       this.show(await this.api.ask("preview", this.file));
@@ -114,9 +120,31 @@ export class Configuration {
         make("li", {}, `${count}: ${reason}`))),
       make("p", {}, ...preview.unserved.slice(0, kUnservedShown).flatMap(({unit_id}) =>
         [this.unitButton(unit_id), " "]), not > kUnservedShown ? "…" : "")]),
+    ...(preview.moving === 0 ? [] : [make("p", {class: "buttons"}, make("button", {type: "button",
+      id: "play-preview", onclick: () => this.playPreview(preview)}, "Play the plan"))]),
     make("p", {class: "buttons"}, apply, corrections,
         make("button", {type: "button", onclick: () => this.clear()}, "Discard")),
     make("p", {class: "trouble", id: "apply-trouble", role: "alert"}));
+  }
+
+  /** The plan in motion, from the places where the units stood when it was made. */
+  async playPreview(preview) {
+    const {plate, player} = this;
+    try {
+      const bytes = await this.api.bytes(`/preview-motion?plan=${preview.plan}`);
+      if (!bytes) throw new Error("another preview came since; preview the file again");
+      const unserved = new Set(preview.unserved.map(({unit_id}) => plate.fleet.placeOf.get(unit_id)));
+      const film = filmOfPreview(plate.fleet, motionsIn(bytes)[0], unserved,
+          (u) => stateOf(plate.fleet, u));
+      this.isShown = true;
+      player.open(film, {title: `Preview of ${this.file.source}, not live: nothing moves.`,
+        note: "By the rows of its plan.",
+        describe: (u) => `Unit ${plate.fleet.id[u]}: ` + (unserved.has(u) ? "not served."
+          : Number.isNaN(film.targetTheta[u]) ? "it stays." : "it moves."),
+        closed: () => { this.isShown = false; }});
+    } catch (error) {
+      setText(find("apply-trouble"), `The plan cannot be shown: ${error.message}.`);
+    }
   }
 
   async apply(button, corrections) {
@@ -155,7 +183,7 @@ export class Configuration {
     if (!busy) {
       setText(find("progress-text"), c.id === 0 ? "No configuration was applied yet."
         : `Configuration ${c.id} is ${c.state}.`);
-      bar.value = c.id !== 0 && c.state === "done" ? 1 : 0;
+      set(bar, "value", c.id !== 0 && c.state === "done" ? 1 : 0);
       return;
     }
     const late_s = c.makespan_s - c.makespan_predicted_s;
@@ -167,7 +195,7 @@ export class Configuration {
     const arrived = c.targeted > 0 ? c.arrived / c.targeted : 0;
     const passed = c.makespan_predicted_s > 0
       ? Math.min(0.99, c.makespan_s / c.makespan_predicted_s) : 0;
-    bar.value = Math.max(arrived, passed);
+    set(bar, "value", Math.max(arrived, passed));
   }
 
   showUnderWay(c) {

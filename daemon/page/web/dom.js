@@ -18,6 +18,14 @@ export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/**
+ * Sets a property where it has another value. A browser lays a page out anew for a class or a value
+ * that is written again, and each second of it is felt at rest.
+ */
+export function set(element, name, value) {
+  if (element[name] !== value) element[name] = value;
+}
+
 /** Seconds in words that are easy to read: 8.4 s, 3 min 20 s, 2 h 5 min. */
 export function duration(seconds) {
   if (!Number.isFinite(seconds)) return "–";

@@ -1,12 +1,14 @@
-// What happened, newest first, page by page. The list is asked for while it is open alone.
+// What happened, and who commanded it, newest first, page by page. A list is asked for while it is
+// open alone.
 
 import {clock, find, make} from "/page/dom.js";
 
 const kRowsOfPage = 20;
 
 export class Events {
-  constructor(api) {
-    this.api = api;
+  /** `onNews()` is called when something has changed. */
+  constructor(api, onNews) {
+    Object.assign(this, {api, onNews});
     this.key = "";
     find("events").addEventListener("toggle", () => {
       if (find("events").open) this.page(null);
@@ -20,6 +22,7 @@ export class Events {
     if (key === this.key) return;
     this.key = key;
     if (find("events").open) this.page(null);
+    this.onNews();
   }
 
   /** Events before an instant; null: the newest. */
@@ -38,6 +41,45 @@ export class Events {
       if (events.length === kRowsOfPage)
         body.append(make("button", {type: "button", class: "more",
           onclick: () => this.page(events.at(-1).at_ns)}, "Earlier"));
+    } catch (error) {
+      body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
+    }
+  }
+}
+
+/** Commands and refusals by the daemon's audit, which takes the role operator. */
+export class Commands {
+  constructor(api, access) {
+    Object.assign(this, {api, access});
+    find("commands").addEventListener("toggle", () => {
+      if (find("commands").open) this.page(null);
+    });
+  }
+
+  /** Something has changed that may follow a command. */
+  note() {
+    if (find("commands").open) this.page(null);
+  }
+
+  async page(before) {
+    const body = find("commands-list");
+    if (!this.access.may("audit"))
+      return body.replaceChildren(make("p", {class: "hint"},
+          `This takes the role operator; you are ${this.access.role}.`));
+    try {
+      const {entries} = await this.api.ask("audit",
+          {limit: kRowsOfPage, ...(before === null ? {} : {until_ns: before})});
+      body.querySelector(".more")?.remove();
+      if (before === null) body.replaceChildren();
+      body.append(...entries.map((entry) => make("p", {class: `event ${entry.taken ? "" : "warning"}`},
+          make("span", {class: "hint"}, `${clock(entry.at)} `), make("b", {}, entry.verb), " by ",
+          `${entry.name || "somebody"} (${entry.role}, ${entry.door})`,
+          entry.taken ? "" : `: refused, ${entry.reason}`)));
+      if (entries.length === 0 && before === null)
+        body.append(make("p", {class: "hint"}, "Nothing was commanded yet."));
+      if (entries.length === kRowsOfPage)
+        body.append(make("button", {type: "button", class: "more",
+          onclick: () => this.page(entries.at(-1).at_ns)}, "Earlier"));
     } catch (error) {
       body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
     }

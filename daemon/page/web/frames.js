@@ -16,6 +16,38 @@ function angleOf(code) {
   return code === kNoCode ? NaN : code * kRadiansPerStep;
 }
 
+const codeOf = (angle) => Number.isNaN(angle) ? kNoCode : Math.round(angle / kRadiansPerStep);
+
+/** The fleet as a snapshot, as the daemon would send it: for another tab. */
+export function snapshotOf(fleet) {
+  const facts = new TextEncoder().encode(JSON.stringify(fleet.facts));
+  const bytes = new Uint8Array(kHeadBytes - 4 + facts.length + fleet.count * kWholeBytes);
+  const view = new DataView(bytes.buffer);
+  const at = (offset) => offset - 4;  // the length is not there
+  view.setUint8(at(4), 1);
+  view.setUint8(at(5), 1);
+  view.setUint32(at(8), fleet.number, true);
+  view.setFloat64(at(12), fleet.made_ms, true);
+  view.setFloat64(at(20), fleet.status_ms, true);
+  view.setUint32(at(28), fleet.count, true);
+  view.setUint32(at(32), facts.length, true);
+  view.setUint32(at(36), fleet.count, true);
+  view.setUint32(at(40), 0, true);
+  bytes.set(facts, kHeadBytes - 4);
+  for (let u = 0; u < fleet.count; ++u) {
+    const from = kHeadBytes - 4 + facts.length + u * kWholeBytes;
+    [fleet.theta, fleet.phi, fleet.targetTheta, fleet.targetPhi].forEach((column, k) =>
+      view.setUint16(from + 2 * k, codeOf(column[u]), true));
+    view.setUint16(from + 8, Number.isNaN(fleet.error_um[u]) ? kNoCode
+      : Math.round(2 * fleet.error_um[u]), true);
+    view.setUint8(from + 10, fleet.phase[u]);
+    view.setUint8(from + 11, fleet.witness[u]);
+    view.setUint8(from + 12, fleet.outcome[u]);
+    view.setUint8(from + 13, fleet.enabled[u] | fleet.fault[u] << 1);
+  }
+  return bytes;
+}
+
 export class Fleet {
   constructor(layout) {
     const n = layout.count;
@@ -43,6 +75,7 @@ export class Fleet {
     this.fault = new Uint8Array(n);
     this.changed_ms = new Float64Array(n).fill(NaN);  // this browser's clock
     this.facts = null;
+    this.factsText = "";
     this.number = 0;
     this.status_ms = 0;  // the daemon's clock
     this.made_ms = 0;
@@ -50,7 +83,8 @@ export class Fleet {
   }
 
   /**
-   * Takes a frame, without its length. Calls `turned(u)` for each unit whose arms turned, before
+   * Takes a frame, without its length. The result has whether it is a snapshot, and whether its
+   * facts are new. Calls `turned(u)` for each unit whose arms turned, before
    * they do, and `whole(u)` for each whose state came. Throws where the frame does not go on.
    */
   take(buffer, now_ms, turned, whole) {
@@ -70,9 +104,12 @@ export class Fleet {
     const wholes = view.getUint32(at(36), true);
     const angles = view.getUint32(at(40), true);
     let offset = kHeadBytes - 4;
+    let isNew = false;
     if (facts > 0) {
       const text = new TextDecoder().decode(buffer.subarray(offset, offset + facts));
-      this.facts = JSON.parse(text);
+      isNew = text !== this.factsText;  // at rest they are the same each second
+      this.factsText = text;
+      if (isNew) this.facts = JSON.parse(text);
       offset += facts;
     }
     offset = this.takeGroup(view, offset, wholes, kWholeBytes, (u, from) => {
@@ -87,7 +124,7 @@ export class Fleet {
       this.takeAngles(view, u, from);
       this.changed_ms[u] = now_ms;
     });
-    return {snapshot, facts: facts > 0};
+    return {snapshot, facts: isNew};
   }
 
   takeGroup(view, offset, count, bytes, take) {

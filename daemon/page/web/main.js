@@ -3,23 +3,34 @@
 import {Access} from "/page/access.js";
 import {Alarms} from "/page/alarms.js";
 import {Api} from "/page/api.js";
-import {makeThemes} from "/page/colours.js";
+import {Camera} from "/page/camera.js";
+import {makeFilmThemes, makeThemes} from "/page/colours.js";
 import {Configuration} from "/page/configuration.js";
-import {counted, duration, find, make, setText} from "/page/dom.js";
-import {Events} from "/page/events.js";
+import {Curves} from "/page/curves.js";
+import {counted, duration, find, make, set, setText} from "/page/dom.js";
+import {Diagnosis} from "/page/diagnosis.js";
+import {Earlier} from "/page/earlier.js";
+import {Commands, Events} from "/page/events.js";
 import {Fleet, kPhases} from "/page/frames.js";
-import {Pointer} from "/page/pointer.js";
+import {Model} from "/page/model.js";
+import {Nights} from "/page/nights.js";
 import {Plate} from "/page/plate.js";
+import {Player} from "/page/player.js";
+import {Pointer} from "/page/pointer.js";
+import {SharedStream} from "/page/shared_stream.js";
+import {Sheets} from "/page/sheets.js";
 import {Stop} from "/page/stop.js";
-import {Stream} from "/page/stream.js";
 import {UnitPanel} from "/page/unit.js";
 
 const kStale_ms = 2500;  // status comes each second at least
 const kLegend_ms = 500;
 
-/** An age in whole seconds: a text that changes all the time is neither calm nor cheap. */
+/**
+ * An age in whole seconds: a text that changes all the time is neither calm nor cheap. Status comes
+ * each second at rest, so that ages below two seconds are one text.
+ */
 function inWords(age_ms) {
-  return age_ms < 1000 ? "less than 1 s" : duration(Math.floor(age_ms / 1000)).replace(".0", "");
+  return age_ms < 2000 ? "less than 2 s" : duration(Math.floor(age_ms / 1000)).replace(".0", "");
 }
 
 class Page {
@@ -27,8 +38,8 @@ class Page {
     this.api = new Api();
     this.access = new Access(this.api, () => this.signedIn());
     this.stop = new Stop(this.api, this.access);
-    this.stream = new Stream(this.api, (bytes) => this.onFrame(bytes),
-        (state, text) => this.onState(state, text));
+    this.stream = new SharedStream(this.api, (bytes) => this.onFrame(bytes),
+        (state, text) => this.onState(state, text), () => this.fleet);
     this.plate = null;
     this.linkState = "waiting";
     this.linkText = "";
@@ -49,6 +60,8 @@ class Page {
     if (this.plate) {
       this.stream.restart();
       this.alarms.refresh();
+      this.commands.note();
+      this.sheets.show(this.sheets.shown);
       if (this.fleet.facts) this.configuration.resultOf = "";
       return;
     }
@@ -69,11 +82,16 @@ class Page {
     this.fleet = new Fleet(layout);
     this.plate = new Plate(find("plate"), this.fleet);
     const showUnit = (id) => this.unit.showId(id);
-    this.unit = new UnitPanel(this.api, this.plate, () => this.showScale());
+    this.unit = new UnitPanel(this.api, this.plate, () => this.showScale(),
+        (u) => this.player?.select(u));
     this.alarms = new Alarms(this.api, this.access, showUnit);
-    this.configuration = new Configuration(this.api, this.access, this.plate, showUnit);
-    this.events = new Events(this.api);
+    this.player = new Player(this.plate, () => this.filmChanged(), () => this.showLegend());
+    this.configuration = new Configuration(this.api, this.access, this.plate, this.player, showUnit);
+    this.earlier = new Earlier(this.api, this.access, this.plate, this.player);
+    this.commands = new Commands(this.api, this.access);
+    this.events = new Events(this.api, () => this.commands.note());
     this.openThemes();
+    this.openSheets();
     new Pointer(this.plate, (u) => this.unit.select(u), () => this.showScale());
     const fit = () => {
       this.plate.resize();
@@ -83,8 +101,40 @@ class Page {
     fit();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
       this.plate.recolour();
+      this.curves.remake();
       this.showLegend();
     });
+  }
+
+  openSheets() {
+    const {api, plate} = this;
+    const showUnit = (id) => {
+      this.sheets.show("plate");
+      this.unit.showId(id);
+    };
+    this.curves = new Curves(api, plate, () => this.sheets.shown === "curves");
+    this.nights = new Nights(api);
+    this.model = new Model(api, this.access);
+    this.diagnosis = new Diagnosis(api, this.access, () => this.sheets.shown === "diagnosis",
+        () => this.sheets.show("model"));
+    this.camera = new Camera(api, plate, showUnit);
+    this.sheets = new Sheets({curves: () => this.curves.show(), nights: () => this.nights.show(),
+      model: () => this.model.show(), diagnosis: () => this.diagnosis.show(), camera: () => this.camera.show()});
+  }
+
+  /** The plate shows a film, or the live fleet again. */
+  filmChanged() {
+    const {film} = this.player;
+    const select = find("theme");
+    const themes = film ? makeFilmThemes(film, this.themes) : this.themes;
+    for (const option of select.options) option.disabled = !themes[option.value];
+    if (!themes[select.value]) select.value = "state";
+    this.shownThemes = themes;
+    if (film) this.sheets.show("plate");
+    find("sheet-plate").classList.toggle("film", Boolean(film));
+    this.plate.setTheme(themes[select.value]);
+    this.player.select(this.plate.selected);
+    this.showLegend();
   }
 
   openThemes() {
@@ -93,9 +143,10 @@ class Page {
     select.replaceChildren(...Object.entries(this.themes).map(([name, {title}]) =>
       make("option", {value: name}, title)));
     select.addEventListener("change", () => {
-      this.plate.setTheme(this.themes[select.value]);
+      this.plate.setTheme(this.shownThemes[select.value]);
       this.showLegend();
     });
+    this.shownThemes = this.themes;
     this.plate.setTheme(this.themes.state);
     this.showLegend();
   }
@@ -112,7 +163,7 @@ class Page {
     });
     plate.endFrame();
     if (snapshot) plate.placeAll();
-    if (snapshot || states) plate.reindex();
+    if (!plate.film && (snapshot || states)) plate.reindex();
     // The legend is written now and then, where hundreds change with each frame.
     this.isLegendOld = this.isLegendOld || states;
     if (snapshot || (this.isLegendOld && now_ms > this.legendAt_ms)) this.renewLegend(now_ms);
@@ -144,10 +195,10 @@ class Page {
     const words = {live: "live", waiting: "no link", token: "signed out", full: "full"};
     const link = find("link");
     setText(link, live || this.linkState !== "live" ? words[this.linkState] : "daemon is late");
-    link.className = `pill ${live ? "live" : this.linkState === "live" ? "waiting" : this.linkState}`;
+    set(link, "className", `pill ${live ? "live" : this.linkState === "live" ? "waiting" : this.linkState}`);
     setText(find("age"), age_ms === Infinity ? "no data yet" : `data ${inWords(age_ms)} old`);
     const stale = find("stale");
-    stale.hidden = live;
+    set(stale, "hidden", live);
     if (!live) setText(stale, age_ms === Infinity ? this.linkText || "Waiting for the daemon."
       : `Old: the plate as it was ${inWords(age_ms)} ago. ${this.linkText}`);
     if (!this.plate) return;
@@ -168,11 +219,12 @@ class Page {
         counts.map(([name, count]) => `${count.toLocaleString("en")} ${name}`).join(", ") +
         (facts.store_failing ? ". The store fails: nothing new may move." : ""));
     this.configuration.note(facts);
+    this.earlier.note(facts);
     this.alarms.note(facts.alarms);
     this.events.note(facts);
     const down = facts.buses.filter(({link}) => link !== "up");
     const load = Math.max(0, ...facts.buses.map((bus) => bus.load));
-    find("buses").className = down.length > 0 ? "trouble" : "";
+    set(find("buses"), "className", down.length > 0 ? "trouble" : "");
     setText(find("buses"), `${counted(facts.buses.length, "bus", "buses")}, ` + (down.length === 0
       ? `all up, the fullest ${(100 * load).toFixed(0)} % full`
       : `${down.length} not up: ${down.slice(0, 12).map(({bus_id}) => bus_id).join(", ")}`) + ".");
@@ -189,8 +241,11 @@ class Page {
     }
     entries.forEach(({colour}, k) => {
       const item = list.children[k];
-      item.className = plate.counts[k] === 0 ? "empty" : "";
-      item.firstChild.style.background = plate.colours[colour];
+      set(item, "className", plate.counts[k] === 0 ? "empty" : "");
+      if (item.dataset.colour !== plate.colours[colour]) {
+        item.dataset.colour = plate.colours[colour];
+        item.firstChild.style.background = plate.colours[colour];
+      }
       setText(item.children[1], plate.counts[k].toLocaleString("en"));
     });
   }

@@ -10,6 +10,7 @@ import {View} from "/page/view.js";
 const kNear_px = 26;        // a pitch from which on units are drawn as shapes
 const kReachOfClick_px = 14;
 const kFullCircle = 2 * Math.PI;
+const kTurnOfGap = 1.1;
 const kTurnMost_ms = 400;   // after a longer gap arms are shown where they are
 
 /** The shortest way from one angle to another. */
@@ -40,9 +41,11 @@ export class Plate {
     this.fromPhi = new Float64Array(n);
     this.turning = new Set();
     this.turnedAt_ms = 0;
+    this.gaps_ms = [100];  // between the last frames
     this.turn_ms = 100;
     this.selected = -1;
     this.marked = [];  // units that a preview does not serve
+    this.film = null;  // shown in place of the live fleet
     this.isStale = true;
     this.times_ms = [];  // of drawing, the newest last
     this.isAsked = false;
@@ -79,11 +82,24 @@ export class Plate {
   reindex() {
     this.counts = new Array(this.theme.entries.length).fill(0);
     for (let u = 0; u < this.fleet.count; ++u) {
-      this.state[u] = stateOf(this.fleet, u);
+      this.state[u] = this.film ? this.film.state[u] : stateOf(this.fleet, u);
       this.index[u] = this.theme.indexOf(u);
       ++this.counts[this.index[u]];
     }
     this.dirty = true;
+  }
+
+  /** Shows a film, or with null the live fleet again. */
+  show(film) {
+    this.film = film;
+    this.placeAll();
+  }
+
+  /** The film stands at another instant. */
+  placeFilm() {
+    const {theta, phi} = this.film;
+    for (let u = 0; u < this.fleet.count; ++u) this.place(u, theta[u], phi[u]);
+    this.reindex();
   }
 
   // ---- motion
@@ -106,8 +122,9 @@ export class Plate {
       fromPhi[u] = this.shown(fromPhi[u], fleet.phi[u], share);
     }
     const gap_ms = now_ms - this.turnedAt_ms;
-    if (gap_ms > kTurnMost_ms) this.turn_ms = 1;
-    else this.turn_ms = 0.7 * Math.max(this.turn_ms, 20) + 0.3 * gap_ms;
+    // Frames come unevenly: arms that arrive at the mean gap would stand and jump.
+    if (gap_ms <= kTurnMost_ms) this.gaps_ms = [...this.gaps_ms.slice(-4), gap_ms];
+    this.turn_ms = gap_ms > kTurnMost_ms ? 1 : kTurnOfGap * Math.max(...this.gaps_ms);
     this.before = this.turning;
     this.turning = new Set();
     this.turnedAt_ms = now_ms;
@@ -125,6 +142,10 @@ export class Plate {
 
   /** The frame is read: units that no longer turn are where it has them. */
   endFrame() {
+    if (this.film) {  // the live fleet goes on unseen
+      this.before = null;
+      return this.turning.clear();
+    }
     for (const u of this.before) this.place(u, this.fleet.theta[u], this.fleet.phi[u]);
     if (this.before.size + this.turning.size > 0) this.dirty = true;
     this.before = null;
@@ -142,6 +163,7 @@ export class Plate {
   placeAll() {
     const {fleet} = this;
     this.turning.clear();
+    if (this.film) return this.placeFilm();
     for (let u = 0; u < fleet.count; ++u) this.place(u, fleet.theta[u], fleet.phi[u]);
     this.dirty = true;
   }
@@ -167,8 +189,9 @@ export class Plate {
 
   targetOf(u) {
     const {fleet} = this;
-    const theta = fleet.targetTheta[u];
-    const both = theta + fleet.targetPhi[u];
+    const {targetTheta, targetPhi} = this.film ?? fleet;
+    const theta = targetTheta[u];
+    const both = theta + targetPhi[u];
     return [
       fleet.x_mm[u] + fleet.arm_theta_mm[u] * Math.cos(theta) +
           fleet.arm_phi_mm[u] * Math.cos(both),
@@ -199,7 +222,7 @@ export class Plate {
     else this.near.draw(this.view.visible());
     this.context.setTransform(this.view.ratio, 0, 0, this.view.ratio, 0, 0);
     this.drawMarks();
-    if (this.isStale) this.drawHatch();
+    if (this.isStale && !this.film) this.drawHatch();
     const took_ms = performance.now() - begun;
     performance.measure("plate", {start: begun, duration: took_ms});
     performance.clearMeasures("plate");

@@ -54,38 +54,47 @@ export class Stream {
     this.tries = 0;
     this.abort = null;
     this.wake = null;
+    this.turn = 0;  // a run that is no longer the newest ends
   }
 
   async run() {
+    const turn = ++this.turn;
     for (;;) {
       await this.once();
+      if (turn !== this.turn) return;
       const wait_ms = kWaits_ms[Math.min(this.tries++, kWaits_ms.length - 1)];
       await new Promise((resolve) => {
         this.wake = resolve;
         setTimeout(resolve, wait_ms);
       });
+      if (turn !== this.turn) return;
     }
   }
 
-  /** A new stream at once, as after a new token. */
-  restart() {
+  /** No stream any more. */
+  end() {
+    ++this.turn;
     this.tries = 0;
     if (this.abort) this.abort.abort();
     if (this.wake) this.wake();
   }
 
   async once() {
-    this.abort = new AbortController();
+    const abort = this.abort = new AbortController();
+    const {turn} = this;
+    const say = (state, text) => {
+      if (turn === this.turn) this.onState(state, text);
+    };
     let watchdog = 0;
     const watch = () => {
       clearTimeout(watchdog);
-      watchdog = setTimeout(() => this.abort.abort(), kSilence_ms);
+      watchdog = setTimeout(() => abort.abort(), kSilence_ms);
     };
     try {
       watch();
       const answer = await fetch("/stream", {headers: this.api.headers(), cache: "no-store",
-        signal: this.abort.signal});
-      if (!answer.ok) return this.refused(answer);
+        signal: abort.signal});
+      if (!answer.ok) return this.refused(answer, say);
       const reader = answer.body.getReader();
       const splitter = new FrameSplitter();
       for (;;) {
@@ -94,25 +103,26 @@ export class Stream {
         watch();
         this.bytes += value.length;
         for (const frame of splitter.push(value)) {
+          if (turn !== this.turn) return;
           this.onFrame(frame);
           this.tries = 0;
-          this.onState("live", "");
+          say("live", "");
         }
       }
-      this.onState("waiting", "The daemon has ended the stream. It is asked again.");
+      say("waiting", "The daemon has ended the stream. It is asked again.");
     } catch (error) {
       const text = error instanceof TypeError || error.name === "AbortError"
         ? "No link to the daemon. It is tried again." : `The stream broke: ${error.message}.`;
-      this.onState("waiting", text);
+      say("waiting", text);
     } finally {
       clearTimeout(watchdog);
     }
   }
 
-  async refused(answer) {
+  async refused(answer, say) {
     const text = await this.api.errorOf(answer);
-    if (answer.status === 401 || answer.status === 403) this.onState("token", text);
-    else if (answer.status === 503) this.onState("full", text);
-    else this.onState("waiting", text);
+    if (answer.status === 401 || answer.status === 403) say("token", text);
+    else if (answer.status === 503) say("full", text);
+    else say("waiting", text);
   }
 }

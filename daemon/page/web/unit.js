@@ -18,10 +18,9 @@ function point(x, y) {
 }
 
 export class UnitPanel {
-  constructor(api, plate, onView) {
-    this.api = api;
-    this.plate = plate;
-    this.onView = onView;
+  /** `onView()`: the view moves; `onSelect(place)`: another unit, or -1. */
+  constructor(api, plate, onView, onSelect) {
+    Object.assign(this, {api, plate, onView, onSelect});
     this.place = -1;
     this.list = make("dl");
     this.history = make("div");
@@ -53,6 +52,7 @@ export class UnitPanel {
   }
 
   select(place) {
+    this.onSelect(place);
     if (place !== this.place) this.history.replaceChildren();
     this.place = place;
     this.plate.selected = place;

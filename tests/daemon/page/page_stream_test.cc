@@ -78,6 +78,7 @@ class PageStreamTest : public ::testing::Test {
   PageStreamTest() {
     const std::int64_t now_s = WallTime::Now().ns / 1'000'000'000;
     viewer_ = *AddToken("look", Role::kViewer, now_s, now_s + 3600, &tokens_);
+    operator_ = *AddToken("olga", Role::kOperator, now_s, now_s + 3600, &tokens_);
     Keep();
   }
   void Keep() {
@@ -91,7 +92,7 @@ class PageStreamTest : public ::testing::Test {
         .tokens =
             std::make_shared<TokenRegister>(TokenRegister::Options{.path = folder_ / "tokens.csv"}),
         .viewer_without_token = viewer_without_token});
-    AddPageRoutes(&layout_, &feed_, router.get());
+    AddPageRoutes({&layout_, &feed_, &plans_, &night_, &diagnosis_}, router.get());
     server_ = std::make_unique<HttpServer>(
         HttpServer::Options{.address = "127.0.0.1", .router = std::move(router), .limits = limits});
     ASSERT_TRUE(WaitUntil([&] { return server_->port() != 0; }, kPatienceMs));
@@ -104,11 +105,22 @@ class PageStreamTest : public ::testing::Test {
             buffer_bytes};
   }
 
+  Client Post(const std::string& path, const std::string& token, const std::string& body) const {
+    return {server_->port(),
+            "POST " + path + " HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer " + token +
+                "\r\nContent-Type: application/json\r\nContent-Length: " +
+                std::to_string(body.size()) + "\r\nConnection: close\r\n\r\n" + body};
+  }
+
   test::ScratchFolder folder_;
   std::vector<Token> tokens_;
   std::string viewer_;
+  std::string operator_;
   Layout layout_ = Layout::Create(MakeHexLayout({.count = 2000}), {}).value();
   PlateFeed feed_{{.layout = &layout_, .viewers_max = 2, .pause = milliseconds(0)}};
+  KeptPlans plans_;
+  NightCurves night_;
+  DiagnosisJob diagnosis_{{.programs = {}, .folder = folder_ / "diagnosis"}};
   std::unique_ptr<HttpServer> server_;  // ends before the feed
   bool toggled_ = false;
 };
@@ -178,6 +190,51 @@ TEST_F(PageStreamTest, ARevokedTokenEndsItsStream) {
   ASSERT_TRUE(RevokeToken("look", WallTime::Now().ns / 1'000'000'000, &tokens_));
   Keep();
   EXPECT_TRUE(WaitUntil([&] { return feed_.viewers() == 0; }, kPatienceMs));
+}
+
+TEST_F(PageStreamTest, MotionsOfPlansAreForThoseWhoMaySeeThem) {
+  Serve();
+  plans_.Put(7, "motion of seven");
+  plans_.PutPreview(3, "motion of a preview");
+  EXPECT_THAT(Ask("/motion?configuration=7", "").ReadToTheEnd(), StartsWith("HTTP/1.1 401"));
+  EXPECT_THAT(Ask("/motion?configuration=7", viewer_).ReadToTheEnd(),
+              AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("motion of seven")));
+  EXPECT_THAT(Ask("/motion?configuration=8", viewer_).ReadToTheEnd(),
+              AllOf(StartsWith("HTTP/1.1 404"), HasSubstr("not kept")));
+  for (const char* path : {"/motion", "/motion?configuration=seven", "/motion?configuration=-1",
+                           "/motion?configuration=7x"})
+    EXPECT_THAT(Ask(path, viewer_).ReadToTheEnd(), StartsWith("HTTP/1.1 400")) << path;
+  EXPECT_THAT(Ask("/preview-motion?plan=3", viewer_).ReadToTheEnd(), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(Ask("/preview-motion?plan=3", operator_).ReadToTheEnd(),
+              HasSubstr("motion of a preview"));
+  EXPECT_THAT(Ask("/preview-motion?plan=7", operator_).ReadToTheEnd(), StartsWith("HTTP/1.1 404"));
+}
+
+TEST_F(PageStreamTest, CurvesAreThoseSinceAnInstant) {
+  Serve();
+  EXPECT_THAT(Ask("/curves", "").ReadToTheEnd(), StartsWith("HTTP/1.1 401"));
+  EXPECT_THAT(Ask("/curves", viewer_).ReadToTheEnd(),
+              AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("\"bus_load_max\":[]")));
+  EXPECT_THAT(Ask("/curves?since_ms=12", viewer_).ReadToTheEnd(), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(Ask("/curves?since_ms=now", viewer_).ReadToTheEnd(), StartsWith("HTTP/1.1 400"));
+}
+
+TEST_F(PageStreamTest, ADiagnosisIsBegunByOperatorsAndSeenByAll) {
+  Serve();
+  const std::string campaign = R"({"name":"n","moves_csv":"m","units_csv":"u"})";
+  EXPECT_THAT(Ask("/diagnosis", viewer_).ReadToTheEnd(), HasSubstr("\"state\":\"none\""));
+  EXPECT_THAT(Post("/diagnosis", viewer_, campaign).ReadToTheEnd(),
+              AllOf(StartsWith("HTTP/1.1 403"), HasSubstr("operator")));
+  EXPECT_THAT(Post("/diagnosis-cancel", viewer_, "{}").ReadToTheEnd(), StartsWith("HTTP/1.1 403"));
+  for (const char* body : {"", "[]", R"({"name":"n","moves_csv":"m"})",
+                           R"({"name":7,"moves_csv":"m","units_csv":"u"})"})
+    EXPECT_THAT(Post("/diagnosis", operator_, body).ReadToTheEnd(), StartsWith("HTTP/1.1 400"))
+        << body;
+  EXPECT_THAT(Post("/diagnosis", operator_, campaign).ReadToTheEnd(),
+              AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("focalfleet-study")));
+  EXPECT_THAT(Post("/diagnosis-cancel", operator_, "{}").ReadToTheEnd(),
+              StartsWith("HTTP/1.1 409"));
+  EXPECT_THAT(Ask("/diagnosis-page", viewer_).ReadToTheEnd(), StartsWith("HTTP/1.1 409"));
 }
 
 TEST_F(PageStreamTest, AServerEndsWhileViewersLookOn) {

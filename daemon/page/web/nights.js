@@ -1,0 +1,66 @@
+// Nights side by side, from noon to noon UTC, by the configurations that the store has of them.
+
+import {duration, find, make} from "/page/dom.js";
+
+const kConfigurations = 1000;
+const kNights = 14;
+const kHalfDay_ms = 12 * 3600 * 1000;
+
+const median = (values) => {
+  const sorted = values.filter((value) => value > 0).sort((a, b) => a - b);
+  return sorted.length === 0 ? NaN : sorted[Math.floor((sorted.length - 1) / 2)];
+};
+
+/** The evening's date of the night in which an instant lies. */
+export function nightOf(iso) {
+  return new Date(Date.parse(iso) - kHalfDay_ms).toISOString().slice(0, 10);
+}
+
+function summaryOf(rows) {
+  const sum = (name) => rows.reduce((total, row) => total + row[name], 0);
+  return {configurations: rows.length, targeted: sum("targeted"), arrived: sum("arrived"),
+    lost: sum("refused") + sum("failed") + sum("unmeasured"),
+    stopped: rows.filter(({state}) => state === "stopped").length,
+    makespan_s: median(rows.map(({makespan_s}) => makespan_s ?? 0)),
+    behind_s: median(rows.map((row) => (row.makespan_s ?? 0) - (row.makespan_predicted_s ?? 0)))};
+}
+
+export class Nights {
+  constructor(api) {
+    this.api = api;
+  }
+
+  async show() {
+    const body = find("nights-table");
+    try {
+      const {configurations} = await this.api.ask("history", {limit: kConfigurations});
+      const nights = new Map();
+      for (const row of configurations) {
+        const night = nightOf(row.began);
+        if (!nights.has(night)) nights.set(night, []);
+        nights.get(night).push(row);
+      }
+      body.replaceChildren(this.tableOf([...nights].slice(0, kNights)), make("p", {class: "hint"},
+          configurations.length === kConfigurations
+            ? `The newest ${kConfigurations} configurations alone: the last night may be cut.` : ""));
+    } catch (error) {
+      body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
+    }
+  }
+
+  tableOf(nights) {
+    if (nights.length === 0) return make("p", {class: "hint"}, "There was no configuration yet.");
+    const heads = ["night of", "configurations", "stopped", "targets", "arrived", "not served",
+      "makespan, median", "behind plan"];
+    const share = ({arrived, targeted}) => targeted === 0 ? "–"
+      : `${(Math.floor(1000 * arrived / targeted) / 10).toFixed(1)} %`;
+    return make("table", {class: "wide"}, make("caption", {}, "Nights, newest first"),
+        make("thead", {}, make("tr", {}, ...heads.map((text) => make("th", {scope: "col"}, text)))),
+        make("tbody", {}, ...nights.map(([night, rows]) => {
+          const s = summaryOf(rows);
+          return make("tr", {}, make("th", {scope: "row"}, night), ...[s.configurations, s.stopped,
+            s.targeted.toLocaleString("en"), share(s), s.lost, duration(s.makespan_s),
+            duration(s.behind_s)].map((value) => make("td", {}, String(value))));
+        })));
+  }
+}
