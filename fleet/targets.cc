@@ -10,6 +10,7 @@
 #include "fleet/files/place.h"
 #include "fleet/geometry/clearance.h"
 #include "fleet/kinematics.h"
+#include "fleet/side_choice.h"
 #include "protocol/base/check.h"
 
 namespace focalfleet {
@@ -109,78 +110,20 @@ Solutions SolutionsFor(PointFp target, const Unit& unit, double free_theta_deg) 
                               ", phi " + RangeText(unit.phi()) + ")");
 }
 
-// The poses that one target leaves open, in the order of preference, nearest first.
-using Choice = std::vector<Pose>;
-
-Choice NearestFirst(const Unit& unit, const UnitDrive& drive, const AxisAngles& from,
-                    std::vector<AxisAngles> solutions) {
+PoseChoice NearestFirst(const Unit& unit, const UnitDrive& drive, const AxisAngles& from,
+                        std::vector<AxisAngles> solutions) {
   std::stable_sort(solutions.begin(), solutions.end(), [&](const auto& a, const auto& b) {
     const Way way_a = WayTo(unit, drive, from, a);
     const Way way_b = WayTo(unit, drive, from, b);
     return way_a.longest_s != way_b.longest_s ? way_a.longest_s < way_b.longest_s
                                               : way_a.sum_s < way_b.sum_s;
   });
-  Choice choice;
+  PoseChoice choice;
   for (const AxisAngles& s : solutions)
     choice.push_back({NearestInRange(s.theta_deg, unit.theta(), drive.axis[0]),
                       NearestInRange(s.phi_deg, unit.phi(), drive.axis[1])});
   return choice;
 }
-
-// Chooses the sides: where the nearest solution touches a neighbour's, another side of the elbow
-// may not.
-class SideChooser {
- public:
-  SideChooser(const Layout& layout, std::span<const UnitDrive> drives,
-              std::vector<std::optional<SegmentFp>> standing)
-      : layout_(layout), drives_(drives), arms_(std::move(standing)) {}
-
-  void Settle(const std::vector<Choice>& choices, std::vector<std::optional<Pose>>* poses) {
-    for (std::uint32_t i = 0; i < layout_.size(); ++i)
-      if ((*poses)[i]) arms_[i] = Arm(i, *(*poses)[i]);
-    constexpr int kPasses = 4;
-    for (int pass = 0; pass < kPasses; ++pass) {
-      bool changed = false;
-      for (std::uint32_t i = 0; i < layout_.size(); ++i)
-        if (choices[i].size() > 1) changed |= Improve(i, choices[i], &(*poses)[i]);
-      if (!changed) return;
-    }
-  }
-
- private:
-  [[nodiscard]] SegmentFp Arm(std::uint32_t i, const Pose& pose) const {
-    return ArmAt(layout_.unit({i}), drives_[i], pose);
-  }
-
-  [[nodiscard]] int Touches(std::uint32_t i, const SegmentFp& arm) const {
-    int count = 0;
-    for (const PositionerIndex j : layout_.neighbours({i}))
-      if (arms_[j.value] && !IsClear(layout_, {{i}, arm}, {j, *arms_[j.value]}, 0)) ++count;
-    for (const Obstacle& obstacle : layout_.obstacles())
-      if (!IsClear(layout_, {{i}, arm}, obstacle, 0)) ++count;
-    return count;
-  }
-
-  bool Improve(std::uint32_t i, const Choice& choice, std::optional<Pose>* pose) {
-    int fewest = Touches(i, *arms_[i]);
-    if (fewest == 0) return false;
-    bool changed = false;
-    for (const Pose& other : choice) {
-      const SegmentFp arm = Arm(i, other);
-      const int touches = Touches(i, arm);
-      if (touches >= fewest) continue;
-      fewest = touches;
-      *pose = other;
-      arms_[i] = arm;
-      changed = true;
-    }
-    return changed;
-  }
-
-  const Layout& layout_;
-  std::span<const UnitDrive> drives_;
-  std::vector<std::optional<SegmentFp>> arms_;
-};
 
 // A row without a fault of its own.
 struct Resolved {
@@ -222,7 +165,7 @@ Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
                                                         std::span<const UnitKnowledge> now) {
   FOCALFLEET_CHECK(drives.size() == layout.size());
   FOCALFLEET_CHECK(now.empty() || now.size() == layout.size());
-  std::vector<Choice> choices(layout.size());
+  std::vector<PoseChoice> choices(layout.size());
   std::vector<std::optional<Pose>> poses(layout.size());
   BadRows bad;
   std::unordered_map<UnitId, int> line_of;
@@ -256,7 +199,7 @@ Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
   std::vector<std::optional<SegmentFp>> standing(layout.size());
   for (std::uint32_t i = 0; i < now.size(); ++i)
     if (IsPlace(now[i])) standing[i] = ArmAt(layout.unit({i}), drives[i], PlaceOf(now[i]));
-  SideChooser(layout, drives, std::move(standing)).Settle(choices, &poses);
+  ChooseSides(layout, drives, std::move(standing), choices, &poses);
   FindCollisions(targets, resolved, layout, drives, poses, &bad);
   FOCALFLEET_TRY(bad.Check());
   return poses;

@@ -163,6 +163,32 @@ TEST(ResolveTargets, TakesTheOtherElbowSideWhereTheNearestTouchesANeighbour) {
   EXPECT_EQ(cases, 20);
 }
 
+// Places of a drawn configuration, which is clear, on plates where an arm reaches over the
+// neighbours' bases and phi goes both ways. Whatever side each place was drawn with, a clear choice
+// of sides is found for all together.
+TEST(ResolveTargets, FindsSidesForAllWhereThereAreAny) {
+  auto units = MakeHexLayout({.count = 200, .pitch_mm = 25, .theta_arm_mm = 8, .phi_arm_mm = 17});
+  for (Unit& unit : units) unit.axis[1].min_deg = -180;
+  const Fleet fleet = FleetOf(units);
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    FOCALFLEET_TRACE_SEED(seed);
+    const auto drawn = DrawConfiguration(fleet.layout, fleet.drives, {}, Rng(seed));
+    ASSERT_TRUE(drawn) << drawn.error().text;
+    Targets targets{"t.csv", {}};
+    for (std::uint32_t i = 0; i < fleet.layout.size(); ++i) {
+      const Unit& unit = fleet.layout.unit({i});
+      targets.rows.push_back(Row(unit.id.value,
+                                 FibreAt(unit, AnglesOf(unit, fleet.drives[i], (*drawn)[i])),
+                                 static_cast<int>(i) + 2));
+    }
+    const auto poses = ResolveTargets(targets, fleet.layout, fleet.drives, {});
+    ASSERT_TRUE(poses) << poses.error().text;
+    std::vector<Pose> taken;
+    for (const std::optional<Pose>& pose : *poses) taken.push_back(*pose);
+    ExpectAllClear(fleet, taken);
+  }
+}
+
 TEST(ResolveTargets, NamesFileLineUnitAndReason) {
   const Fleet fleet = Hex(7);
   EXPECT_EQ(ErrorOf(fleet, {Row(99, PointFp{0, 0}, 5)}),
