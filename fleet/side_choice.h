@@ -1,9 +1,9 @@
 // A fibre reaches most places with its elbow on either side. The nearest side is taken where its
 // arm is clear of the neighbours'; where it is not, other sides are tried, a few passes over all
-// units. What still touches then is decided exactly. A unit has two arms to choose from, and two
+// units. Touches that are left are decided exactly. A unit has two arms to choose from, and two
 // neighbours' arms exclude one another or do not: such a choice is a 2-satisfiability problem,
-// which propagation decides in linear time. If any choice of sides is clear, one is found. Source:
-// Even, Itai and Shamir, SIAM J. Comput. 5 (1976) 691, section 2.
+// which propagation decides in linear time. If any choice of sides is clear, one is found.
+// Source: Even, Itai and Shamir, SIAM J. Comput. 5 (1976) 691, section 2.
 #pragma once
 
 #include <optional>
