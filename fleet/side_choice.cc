@@ -135,8 +135,8 @@ class SideChooser {
     return IsClear(layout_, {{i}, sides_[i][side].arm}, {{j}, sides_[j][side_of_j].arm}, 0);
   }
 
-  /// Takes the side and all that follows from it; nothing where that contradicts itself. What was
-  /// taken without contradiction need never be taken back, as each unit has two sides at most.
+  /// Takes the side and all that follows from it; nothing where that contradicts itself. A choice
+  /// without contradiction need never be taken back, as each unit has two sides at most.
   bool Assume(std::uint32_t i, int side) {
     std::vector<std::uint32_t> taken = {i};
     decided_[i] = side;
