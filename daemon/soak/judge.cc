@@ -45,6 +45,14 @@ double BetweenSegments(Point a, Point b, Point c, Point d) {
       {FromSegment(a, c, d), FromSegment(b, c, d), FromSegment(c, a, b), FromSegment(d, a, b)});
 }
 
+StoredPlace PlaceOf(const VectorRow& vector) {
+  StoredPlace place;
+  for (std::size_t axis = 0; axis < place.size(); ++axis)
+    place[axis] = {static_cast<int>(vector.knowledge[axis].witness), vector.knowledge[axis].low,
+                   vector.knowledge[axis].high};
+  return place;
+}
+
 bool Moves(const sim::UnitTruth& truth) {
   return truth.powered && (truth.state == UnitState::kMoving || truth.state == UnitState::kHoming);
 }
@@ -83,10 +91,7 @@ void Judge::Apply(std::span<const Row> rows, StoredPicture* picture) {
   // Ends of intents are written last.
   for (const Row& row : rows) {
     if (const auto* vector = std::get_if<VectorRow>(&row)) {
-      StoredPlace& place = picture->places[vector->serial.value];
-      for (std::size_t axis = 0; axis < place.size(); ++axis)
-        place[axis] = {static_cast<int>(vector->knowledge[axis].witness),
-                       vector->knowledge[axis].low, vector->knowledge[axis].high};
+      picture->places[vector->serial.value] = PlaceOf(*vector);
     } else if (const auto* intent = std::get_if<IntentRow>(&row)) {
       picture->intents[intent->serial.value] = {intent->unit.value,
                                                 intent->move.value,
@@ -119,7 +124,7 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
   for (const Row& row : rows)
     if (const auto* vector = std::get_if<VectorRow>(&row)) {
       auto& places = reported_[vector->serial.value];
-      places.push_back(shadow_.places[vector->serial.value]);
+      places.push_back(PlaceOf(*vector));
       if (places.size() > kReportedMax) places.pop_front();
     }
 }
@@ -128,11 +133,8 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
 void Judge::NoteBlind(std::span<const Row> rows) {
   std::map<std::uint32_t, StoredPlace> places;
   for (const Row& row : rows) {
-    if (const auto* vector = std::get_if<VectorRow>(&row)) {
-      StoredPicture one;
-      Apply(std::span(&row, 1), &one);
-      places[vector->serial.value] = one.places[vector->serial.value];
-    }
+    if (const auto* vector = std::get_if<VectorRow>(&row))
+      places[vector->serial.value] = PlaceOf(*vector);
     const auto* intent = std::get_if<IntentRow>(&row);
     if (intent == nullptr) continue;
     const std::uint32_t serial = intent->serial.value;

@@ -7,6 +7,7 @@
 #include "daemon/store/audit_rows.h"
 #include "daemon/store/cells.h"
 #include "daemon/store/lock_file.h"
+#include "daemon/store/log_rewrite.h"
 #include "daemon/store/pruner.h"
 #include "daemon/store/row_writer.h"
 #include "daemon/store/schema.h"
@@ -48,6 +49,7 @@ Status SetUp(Connection& connection) {
     return Fail(ErrorCode::kUnavailable,
                 "store " + connection.path() +
                     ": SQLite takes this disk for one that spoils bytes beside those it writes");
+  FOCALFLEET_TRY(RewriteLog(connection));
   return Migrate(connection, version, Migrations());
 }
 

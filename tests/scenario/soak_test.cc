@@ -94,6 +94,32 @@ TEST(MemoryDisk, KeepsWhatWasAcknowledgedOverACutAndAKill) {
   }
 }
 
+// A kernel that drops pages it could not write goes on reading them: the next process finds a batch
+// in the log that is not on the disk, and must not put others behind it.
+TEST(MemoryDisk, ABatchBehindOneThatTheKernelDroppedSurvivesAPowerCut) {
+  Rng rng(1);
+  MemoryDisk disk("memory-disk-test");
+  auto store = Store::Open("s", On(disk));
+  ASSERT_TRUE(store) << store.error().text;
+  ASSERT_TRUE((*store)->Commit(RowsOf(1), {1'000'000}));
+  disk.drops_failed_syncs = true;
+  disk.fails = [](DiskOperation operation) {
+    return operation == DiskOperation::kSync ? SQLITE_IOERR_FSYNC : SQLITE_OK;
+  };
+  EXPECT_FALSE((*store)->Commit(RowsOf(2), {1'000'000}));
+  disk.Kill();
+  disk.fails = [](DiskOperation) { return SQLITE_OK; };
+  auto second = Store::Open("s", On(disk));
+  ASSERT_TRUE(second) << second.error().text;
+  ASSERT_TRUE((*second)->Commit(RowsOf(3), {1'000'000}));
+  disk.CutPower(&rng);
+  auto third = Store::Open("s", On(disk));
+  ASSERT_TRUE(third) << third.error().text;
+  const auto fleet = (*third)->Load();
+  ASSERT_TRUE(fleet) << fleet.error().text;
+  EXPECT_EQ(fleet->vectors.back().serial.value, 3u) << "the acknowledged batch is there";
+}
+
 TEST(MemoryDisk, LosesWhatWasNotSyncedAndDoesNothingForTheDead) {
   MemoryDisk disk("memory-disk-test");
   auto store = Store::Open("s", On(disk));
