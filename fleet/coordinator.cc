@@ -97,6 +97,8 @@ class Coordinator::Impl {
       if (requests_.Answers(*i, Function::kConfirm, sequence)) executor_.OnConfirm(*i, *confirm);
     } else if (const auto* arm = std::get_if<ArmReply>(&heard->message)) {
       if (requests_.Answers(*i, Function::kArm, sequence)) executor_.OnArm(*i, *arm);
+    } else if (const auto* progress = std::get_if<ProgressReply>(&heard->message)) {
+      if (requests_.Answers(*i, Function::kProgress, sequence)) executor_.OnProgress(*i, *progress);
     } else if (const auto* home = std::get_if<HomeReply>(&heard->message)) {
       if (requests_.Answers(*i, Function::kHome, sequence)) executor_.OnHomeReply(*i, *home);
     } else {

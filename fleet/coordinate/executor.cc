@@ -160,6 +160,11 @@ void ConfigurationExecutor::OnArm(PositionerIndex i, const ArmReply& reply) {
   if (const auto refusal = rooms_.upload.OnArm(i, reply)) FailBeforeStart(i, *refusal, &rooms_);
 }
 
+void ConfigurationExecutor::OnProgress(PositionerIndex i, const ProgressReply& reply) {
+  if (const auto refusal = rooms_.upload.OnProgress(i, reply))
+    FailBeforeStart(i, *refusal, &rooms_);
+}
+
 void ConfigurationExecutor::OnHomeReply(PositionerIndex i, const HomeReply& reply) {
   if (rooms_.homing.Refuses(i, reply)) Identify(fleet_, i);
 }

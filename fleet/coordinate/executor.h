@@ -39,6 +39,7 @@ class ConfigurationExecutor {
   void OnExposure(const ExposureDone& done) { progress_.OnExposure(done); }
   void OnConfirm(PositionerIndex i, const ConfirmReply& reply);
   void OnArm(PositionerIndex i, const ArmReply& reply);
+  void OnProgress(PositionerIndex i, const ProgressReply& reply);
   void OnHomeReply(PositionerIndex i, const HomeReply& reply);
   /// Takes the events of units since the last call, then goes on as far as it can.
   void Advance();

@@ -22,7 +22,7 @@ IntentRow HomingIntentOf(const Coordination& fleet, std::uint64_t configuration,
                 .unit = unit.id,
                 .move = move,
                 .from = {},
-                .to = {},
+                .to = HomeCountOf(fleet, i),
                 .hull = {}};
   for (const Axis axis : kAxes) {
     const AxisGeometry& geometry = unit.axis[Index(axis)];
@@ -31,9 +31,8 @@ IntentRow HomingIntentOf(const Coordination& fleet, std::uint64_t configuration,
     const std::int32_t high = NearestVectors(geometry.max_deg, geometry, drive);
     const AxisKnowledge& known = view.knowledge[Index(axis)];
     const bool unknown = known.witness == Witness::kUnknown;
-    const std::int32_t to = axis == Axis::kTheta ? low : high;
+    const std::int32_t to = row.to[Index(axis)];
     row.from[Index(axis)] = unknown ? low : known.low - view.offset[Index(axis)];
-    row.to[Index(axis)] = to;
     row.hull[Index(axis)] = {Witness::kInterval, std::min(unknown ? low : known.low, to),
                              std::max(unknown ? high : known.high, to)};
   }
@@ -103,11 +102,24 @@ bool Homing::Commit() {
   return true;
 }
 
+/// The unit may have been lost, and even read anew, while the store wrote its intent.
+bool Homing::MayBegin(PositionerIndex i) const {
+  const UnitView& view = fleet_.units[i].view;
+  const auto intent = fleet_.ledger.intents.find(view.serial);
+  return view.phase == kReady && intent != fleet_.ledger.intents.end() &&
+         intent->second.move == round_.move;
+}
+
 void Homing::Start() {
   round_.started = fleet_.now();
   round_.last_arrival = fleet_.now();
   for (const PositionerIndex i : wave_) {
     round_[i].plan = RoundUnit::kNoPlan;
+    if (!MayBegin(i)) {
+      configuration_.outcomes.Set(i, TargetOutcome::kFailed, "it was lost before it could home");
+      TakeBackIntent(fleet_, i, &round_);
+      continue;
+    }
     round_.SetPart(i, Part::kMoving);
     fleet_.units.SetPhase(i, kHoming);
     round_[i].before.reset();

@@ -38,6 +38,8 @@ class Homing {
   void EndWave();
 
  private:
+  [[nodiscard]] bool MayBegin(PositionerIndex i) const;
+
   const Coordination fleet_;
   Configuration& configuration_;
   Round& round_;

@@ -3,6 +3,7 @@
 #include <optional>
 #include <utility>
 
+#include "fleet/coordinate/intents.h"
 #include "fleet/coordinate/reconcile.h"
 #include "fleet/coordinate/unit_knowledge.h"
 
@@ -176,6 +177,7 @@ void Concluded(const Coordination& fleet, PositionerIndex i) {
   }
   if (const auto it = fleet.ledger.intents.find(view.serial); it != fleet.ledger.intents.end()) {
     store.intent = it->second;
+    store.homes = it->second.to == HomeCountOf(fleet, i);
     if (reading.status.state == UnitState::kMoving || reading.status.state == UnitState::kHoming) {
       view.knowledge = it->second.hull;
       fleet.units.SetPhase(i, kSettling);
@@ -297,7 +299,11 @@ void OnIdentity(const Coordination& fleet, PositionerIndex i, const IdentifyRepl
   record.trouble.no_serial = false;
   record.protocol_version = identity.protocol_version;
   record.trouble.other_version.reset();
-  if (record.view.serial != identity.serial) record.clock.Forget();
+  if (record.view.serial != identity.serial) {
+    record.clock.Forget();
+    // The place that was known is one of other hardware.
+    if (identity.serial != record.view.bound_serial) record.view.knowledge = {};
+  }
   record.view.serial = identity.serial;
   if (record.view.phase != kIdentifying) fleet.units.SetPhase(i, kIdentifying);
   record.reading.step = 1;

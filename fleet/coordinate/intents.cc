@@ -3,8 +3,17 @@
 #include <optional>
 
 #include "fleet/coordinate/unit_knowledge.h"
+#include "fleet/kinematics.h"
 
 namespace focalfleet {
+
+Pose HomeCountOf(const Coordination& fleet, PositionerIndex i) {
+  const Unit& unit = fleet.layout.unit(i);
+  const UnitDrive& drive = fleet.drive(i);
+  constexpr std::size_t kTheta = Index(Axis::kTheta), kPhi = Index(Axis::kPhi);
+  return {NearestVectors(unit.axis[kTheta].min_deg, unit.axis[kTheta], drive.axis[kTheta]),
+          NearestVectors(unit.axis[kPhi].max_deg, unit.axis[kPhi], drive.axis[kPhi])};
+}
 
 IntentRow IntentOf(const Coordination& fleet, const Round& round, std::uint64_t configuration,
                    PositionerIndex i) {

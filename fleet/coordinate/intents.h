@@ -10,6 +10,8 @@
 
 namespace focalfleet {
 
+/// The counts of a unit that has homed: the stop of each axis.
+[[nodiscard]] Pose HomeCountOf(const Coordination& fleet, PositionerIndex i);
 /// The intent of the unit's move in this round. Pre: it has one.
 [[nodiscard]] IntentRow IntentOf(const Coordination& fleet, const Round& round,
                                  std::uint64_t configuration, PositionerIndex i);

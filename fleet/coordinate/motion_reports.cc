@@ -65,6 +65,14 @@ void OnMotionStatus(const Coordination& fleet, PositionerIndex i, const StatusRe
   }
 }
 
+/// A unit that restarted in mid-move answers a stop with the vectors in its FLASH, where the move
+/// began. The same answer comes from a unit that was stopped before its first step; its status says
+/// which one it is.
+bool CountsFromItsBeginning(const Done& done, const IntentRow& intent) {
+  return (done.outcome == Outcome::kStopped || done.outcome == Outcome::kFault) &&
+         done.position == intent.from && intent.from != intent.to;
+}
+
 void MotionEnded(const Coordination& fleet, PositionerIndex i, const Done& done) {
   UnitRecord& record = fleet.units[i];
   const IntentRow intent = fleet.ledger.intents.at(record.view.serial);
@@ -156,7 +164,12 @@ void OnDone(const Coordination& fleet, PositionerIndex i, Done done, std::uint8_
   if (view.phase == kMoving || view.phase == kHoming) {
     const auto intent = fleet.ledger.intents.find(view.serial);
     if (intent != fleet.ledger.intents.end() && intent->second.move == done.move) {
-      MotionEnded(fleet, i, done);
+      if (CountsFromItsBeginning(done, intent->second)) {
+        Identify(fleet, i);
+        fleet.units.Report(i, UnitEventKind::kEnded);
+      } else {
+        MotionEnded(fleet, i, done);
+      }
     } else if (answer) {  // stopped before it began
       Identify(fleet, i);
       fleet.units.Report(i, UnitEventKind::kNeverBegan, "was stopped before it began");

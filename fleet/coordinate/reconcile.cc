@@ -9,7 +9,7 @@ Reconciled Unknown(const char* reason, std::optional<IntentEnd> end = {}) {
   return {kUnknownPlace, end, reason};
 }
 
-Reconciled AfterIntent(const UnitSays& unit, const IntentRow& intent) {
+Reconciled AfterIntent(const UnitSays& unit, const IntentRow& intent, bool homes) {
   const bool began = unit.status.move == intent.move;
   if (unit.status.interrupted) {
     if (!began)
@@ -22,6 +22,11 @@ Reconciled AfterIntent(const UnitSays& unit, const IntentRow& intent) {
   if (began && unit.position == intent.from && intent.from != intent.to)
     return {InterruptedHull(intent, unit.subdivision), IntentEnd::kInterrupted,
             "it counts from where its last move began, though it began"};
+  // The rotor may have met its stop and slipped while the vectors went on, and where homing began
+  // was not known, as a rule.
+  if (began && homes && unit.position != intent.to)
+    return {InterruptedHull(intent, unit.subdivision), IntentEnd::kStopped,
+            "its homing was cut short"};
   if (began)
     return {Exactly(Witness::kReported, unit.position),
             unit.position == intent.to ? IntentEnd::kArrived : IntentEnd::kStopped};
@@ -45,7 +50,7 @@ UnitKnowledge InterruptedHull(const IntentRow& intent,
 }
 
 Reconciled Reconcile(const UnitSays& unit, const StoreSays& store) {
-  if (store.intent) return AfterIntent(unit, *store.intent);
+  if (store.intent) return AfterIntent(unit, *store.intent, store.homes);
   if (!store.vector) {
     if (unit.status.interrupted) return Unknown("power was lost in a move that is not on record");
     return {Exactly(Witness::kReported, unit.position), {}};

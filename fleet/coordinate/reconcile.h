@@ -3,6 +3,7 @@
 //
 //   mark set                            cut by a power loss        interval over its hull
 //   mark clear, intent open, begun      ended by itself, unheard   reported
+//   the same of homing, not at its stop cut short                  interval over its hull
 //   mark clear, intent open, not begun  never began                reported, if FLASH holds `from`
 //   no intent, FLASH equals the store   as good as before          as stored
 //   no intent, nothing stored           first session              reported
@@ -29,6 +30,7 @@ struct UnitSays {
 struct StoreSays {
   std::optional<VectorRow> vector;
   std::optional<IntentRow> intent;  // the open one, if any
+  bool homes = false;               // the intent ends where homing ends
 };
 
 struct Reconciled {

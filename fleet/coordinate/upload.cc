@@ -84,8 +84,16 @@ void Upload::Send(PositionerIndex i) {
                       BitsOfConfirmed(move, {node, fleet_.requests.SequenceAfter(i, 1)}));
 }
 
+ProgressReply Upload::ArmedProgressOf(PositionerIndex i) const {
+  const UnitView& view = fleet_.units[i].view;
+  const Pose place = PlaceOf(view.knowledge);
+  return {.state = UnitState::kArmed,
+          .position = {place[0] - view.offset[0], place[1] - view.offset[1]},
+          .move = view.move};
+}
+
 // Exact to the bit where nothing is lost. The content of a frame decides its length, the sequence
-// numbers of the two questions included.
+// numbers of the three questions included.
 std::uint32_t Upload::BitsOf(PositionerIndex i, std::vector<CanFrame>* staged) const {
   const StagedMove move = StagedMoveOf(i);
   const NodeId node = fleet_.layout.unit(i).node;
@@ -93,8 +101,11 @@ std::uint32_t Upload::BitsOf(PositionerIndex i, std::vector<CanFrame>* staged) c
   const Address arm{node, fleet_.requests.SequenceAfter(i, 2)};
   ForEachStageFrame(move, node, [&](const CanFrame& frame) { staged->push_back(frame); });
   staged->push_back(Encode(HostMessage(Confirm{move.move}), confirm));
+  const Address progress{node, fleet_.requests.SequenceAfter(i, 3)};
   return BitsOfConfirmed(move, confirm) + BitsOfArmed(move.move, arm) +
-         FrameBits(Encode(HostMessage(Arm{move.move, Digest(move)}), arm));
+         FrameBits(Encode(HostMessage(Arm{move.move, Digest(move)}), arm)) +
+         FrameBits(Encode(HostMessage(ProgressRequest{}), progress)) +
+         FrameBits(Encode(UnitMessage(ArmedProgressOf(i)), progress));
 }
 
 void Upload::Predict(UploadView* upload) {
@@ -154,6 +165,18 @@ std::optional<std::string> Upload::OnConfirm(PositionerIndex i, const ConfirmRep
 std::optional<std::string> Upload::OnArm(PositionerIndex i, const ArmReply& reply) {
   if (fleet_.units[i].view.phase != kArming || reply.move != round_.MoveOf(i)) return {};
   if (reply.answer != Answer::kOk) return std::string("refuses to arm: ") + Name(reply.answer);
+  const Address progress{fleet_.layout.unit(i).node, fleet_.requests.SequenceAfter(i, 1)};
+  fleet_.requests.Ask(i, ProgressRequest{},
+                      FrameBits(Encode(UnitMessage(ArmedProgressOf(i)), progress)));
+  return {};
+}
+
+std::optional<std::string> Upload::OnProgress(PositionerIndex i, const ProgressReply& reply) {
+  if (fleet_.units[i].view.phase != kArming) return {};
+  const ProgressReply armed = ArmedProgressOf(i);
+  if (reply.state != armed.state) return std::string("does not hold its move any more");
+  if (reply.position != armed.position)
+    return std::string("counts from elsewhere than it stood, as after a restart");
   fleet_.units.SetPhase(i, kArmed);
   fleet_.units.bus_of(i).upload_ended = fleet_.now();
   fleet_.timers.Set(i, kNever);

@@ -1,6 +1,7 @@
-// The upload brings each unit of the plan its move: stage, read back, arm. Some units of a bus are
-// uploaded at once, the others wait in order. A repeat of a move is bounded; a unit that still
-// refuses is reported to the caller with the reason.
+// The upload brings each unit of the plan its move: stage, read back, arm, and ask from which
+// counts it will begin. A unit that restarted since it was last read may count from elsewhere, and
+// would begin its way there. Some units of a bus are uploaded at once, the others wait in order. A
+// repeat of a move is bounded; a unit that still refuses is reported to the caller with the reason.
 #pragma once
 
 #include <cstdint>
@@ -32,8 +33,12 @@ class Upload {
   /// Asks the unit to arm where its read-back is right, and sends the move again where it is not.
   /// The result says why the unit fails; none: it does not.
   [[nodiscard]] std::optional<std::string> OnConfirm(PositionerIndex i, const ConfirmReply& reply);
-  /// The unit holds its move where it has armed. The result is as above.
+  /// Asks the unit for its counts where it has armed. The result is as above.
   [[nodiscard]] std::optional<std::string> OnArm(PositionerIndex i, const ArmReply& reply);
+  /// The unit holds its move where it is armed and counts as it is known to. The result is as
+  /// above.
+  [[nodiscard]] std::optional<std::string> OnProgress(PositionerIndex i,
+                                                      const ProgressReply& reply);
   /// The unit has no part in the round any more.
   void Leave(PositionerIndex i);
   [[nodiscard]] bool IsOver() const {
@@ -52,6 +57,8 @@ class Upload {
   };
 
   [[nodiscard]] StagedMove StagedMoveOf(PositionerIndex i) const;
+  /// The answer of a unit that is armed and counts as it is known to.
+  [[nodiscard]] ProgressReply ArmedProgressOf(PositionerIndex i) const;
   /// Appends the frames that the host stages to `staged`; returns the bits of the rest.
   std::uint32_t BitsOf(PositionerIndex i, std::vector<CanFrame>* staged) const;
   [[nodiscard]] BusUpload& bus_of(PositionerIndex i) { return buses_[fleet_.units[i].bus]; }

@@ -17,11 +17,11 @@ namespace focalfleet::test {
 
 /// The upload of one bus, all in bits of its own clock. The needed frames are those without which a
 /// unit is not armed, counted once. They are stage_begin, stage_segment, confirm and its answer,
-/// arm and its answer. Repeats, clock frames, polls and idle time do not count.
+/// arm, progress and their answers. Repeats, clock frames, polls and idle time do not count.
 struct UploadOnWire {
   std::uint64_t needed_bits = 0;
   std::uint64_t other_bits = 0;    // of all other frames between the first and the last needed one
-  std::uint64_t elapsed_bits = 0;  // first stage_begin's start to last arm_reply's end
+  std::uint64_t elapsed_bits = 0;  // first stage_begin's start to last progress_reply's end
   std::uint32_t frames = 0;
   std::uint32_t units = 0;
   std::uint32_t segments = 0;
@@ -50,6 +50,7 @@ inline std::map<BusId, UploadOnWire> MeasureUpload(std::span<const sim::WireFram
       case Function::kStageSegment:
       case Function::kConfirm:
       case Function::kArm:
+      case Function::kProgress:
         return true;
       default:
         return false;

@@ -66,6 +66,15 @@ TEST(Reconcile, IntentEndsAsWhatHappened) {
   EXPECT_EQ(Reconcile(Unit(true, kOurs, kFrom), store).intent_end, IntentEnd::kInterrupted);
 }
 
+TEST(Reconcile, HomingThatDidNotEndAtItsStopLeavesNoPlace) {
+  const StoreSays store{
+      .vector = Stored(Exactly(Witness::kReported, kFrom)), .intent = Intent(), .homes = true};
+  EXPECT_EQ(Reconcile(Unit(false, kOurs, kTo), store).knowledge, Exactly(Witness::kReported, kTo));
+  const Reconciled cut = Reconcile(Unit(false, kOurs, kElsewhere), store);
+  EXPECT_FALSE(IsPlace(cut.knowledge));
+  EXPECT_EQ(cut.intent_end, IntentEnd::kStopped);
+}
+
 TEST(Reconcile, IntervalIsTheHullAndHalfAnElectricalTurn) {
   const StoreSays store{.vector = Stored(Exactly(Witness::kReported, kFrom)), .intent = Intent()};
   const auto knowledge = Reconcile(Unit(true, kOurs, kFrom), store).knowledge;
