@@ -152,7 +152,8 @@ void Firmware::FollowMotion() {
 }
 
 void Firmware::TripIfDue(HostInstant now, TransmitQueue* out) {
-  if (trip_at_ > now || trip_at_ >= machine_.end_at() || !hardware_.faults->in_motion) return;
+  if (!hardware_.faults->in_motion) trip_at_ = kNever;  // the fault was taken back meanwhile
+  if (trip_at_ > now || trip_at_ >= machine_.end_at()) return;
   const Trip trip{hardware_.faults->in_motion->code, hardware_.faults->in_motion->axis};
   hardware_.faults->in_motion.reset();
   RaiseFault(trip, now, out);
