@@ -126,7 +126,7 @@ Result<Summary> RunCampaign(const CampaignOptions& options) {
     const Draws draws = DrawSeed(seed, {.units = options.units});
     options.print(Describe(draws));
     NightOptions night{.replay = options.replay};
-    if (options.tell) night.tell = options.print;
+    if (options.tell) night.tell = night.log = options.print;
     NightResult result = Night(draws, night).Run();
     if (options.twice) {
       const NightResult again = Night(draws, {}).Run();

@@ -269,6 +269,8 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
     case kUnitMarkLost:
       // FLASH shows its damage when the unit starts anew.
       power_cut(row);
+      if (site == kUnitFlashLost && parts_.troubles->counts_lost[row] == Troubles::kLongAgo)
+        parts_.troubles->counts_lost[row] = now_;
       disturb.SpoilFlash(
           unit, site == kUnitFlashLost ? sim::FlashDamage::kOldCounts : sim::FlashDamage::kNoMark);
       return true;

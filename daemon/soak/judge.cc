@@ -7,6 +7,7 @@
 #include <complex>
 #include <variant>
 
+#include "daemon/soak/virtual_time.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet::soak {
@@ -19,7 +20,9 @@ constexpr std::size_t kBrokenMax = 20;
 constexpr double kLagVectors = 24;
 /// The same where a camera finds the unit; its error is largest near the folded arm.
 constexpr double kSeenVectors = 400;
-/// After a power cut a rotor settles where its field is applied anew, within half a turn of it.
+/// After a power cut a rotor settles where its field is applied anew, within half a turn of it. A
+/// rotor at its stop is ahead of or behind a field that turns on by as much, and the daemon takes
+/// the way of an open move for so much wider.
 constexpr double kJumpVectors = 60;
 constexpr DurationNs kStopWithin = Milliseconds(150);
 /// A fault that kept a stop from a unit may lead to contact so long after it.
@@ -123,6 +126,7 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
   in_flight_.reset();
   for (const Row& row : rows)
     if (const auto* vector = std::get_if<VectorRow>(&row)) {
+      first_stored_.try_emplace(vector->serial.value, HostInstant{ReadVirtualNs()});
       auto& places = reported_[vector->serial.value];
       places.push_back(PlaceOf(*vector));
       if (places.size() > kReportedMax) places.pop_front();
@@ -286,7 +290,11 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
   const std::uint32_t serial = unit->second.serial;
   // Other hardware at this place has a place of its own; the store speaks of what was bound here.
   if (serial != plant_->world().flash(truth.id).serial.value) return;
-  const double slack = std::max(slack_vectors_, troubles_->shifted[row] ? kJumpVectors : 0.0);
+  // At its first contact a unit has no witness but its own counts.
+  const auto first = first_stored_.find(serial);
+  if (troubles_->counts_lost[row] != Troubles::kLongAgo &&
+      (first == first_stored_.end() || troubles_->counts_lost[row] <= first->second))
+    return;
   const auto place = shadow_.places.find(serial);
   const auto intent = shadow_.intents.find(serial);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
@@ -299,7 +307,8 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
       high = static_cast<double>(place->second[axis].high);
     }
     const double off = std::max(low - truth.vectors[axis], truth.vectors[axis] - high);
-    if (off <= slack) continue;
+    const bool jumps = troubles_->shifted[row] || intent != shadow_.intents.end();
+    if (off <= std::max(slack_vectors_, jumps ? kJumpVectors : 0.0)) continue;
     Broken("place",
            fmt::format("unit {} axis {} is at {:.1f}, stored is {}{:.0f}..{:.0f}", truth.id.value,
                        axis, truth.vectors[axis],

@@ -70,6 +70,7 @@ class Night {
   bool Settle(double seconds);
   [[nodiscard]] std::vector<std::uint32_t> UnitsThat(
       const std::function<bool(const UnitView&)>& wanted) const;
+  void Pause();
   void SetRight();
   void CheckEnd();
 

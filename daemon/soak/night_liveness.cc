@@ -73,6 +73,11 @@ void Night::Converge() {
   if (judge_->broken().empty()) CheckEnd();
 }
 
+/// A person reads an answer before the next command.
+void Night::Pause() {
+  RunUntil(now_ + Seconds(3), [] { return false; });
+}
+
 /// The operator follows the runbook: faults are cleared, hardware is adopted, units are homed.
 void Night::SetRight() {
   const auto all = [](const UnitView&) { return true; };
@@ -97,6 +102,7 @@ void Night::SetRight() {
       args["unproven"] = true;
       judge_->RiskTaken();
     }
+    if (n > 0) Pause();
     Tell(fmt::format("{} units are homed{}", before.size(), in_vain >= 2 ? ", unproven" : ""));
     WaitFor(operators_->Ask("home", std::move(args)), kConfigurationS);
     Settle(kConfigurationS);
@@ -115,6 +121,15 @@ void Night::CheckEnd() {
   std::string why = "no try";
   bool arrived = false;
   for (int n = 0; n < kTries && !arrived && judge_->broken().empty(); ++n) {
+    if (n > 0) {
+      // The answer says of units in fault that this clears it.
+      Pause();
+      WaitFor(operators_->Ask("enable", {{"unit_ids", UnitsThat([](const UnitView& unit) {
+                                            return unit.phase == UnitPhase::kFault;
+                                          })}}),
+              30);
+      Settle(kIdentifyS);
+    }
     const std::uint64_t request =
         operators_->Ask("apply", {{"targets_csv", operators_->DrawTargets(1)}, {"wait", true}});
     if (!WaitFor(request, kConfigurationS)) {
@@ -131,7 +146,7 @@ void Night::CheckEnd() {
   }
   if (judge_->broken().empty() && !arrived)
     judge_->Broken("liveness", "no configuration is carried out whole: " + why);
-  RunUntil(now_ + Seconds(3), [] { return false; });
+  Pause();
   if (!judge_->broken().empty()) return;
   if (!judge_->acknowledged().intents.empty())
     judge_->Broken("liveness",

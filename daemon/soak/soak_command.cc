@@ -73,7 +73,8 @@ CLI::App* AddSoak(CLI::App* app, SoakOptions* options) {
   soak->add_flag("--twice", options->twice, "Run each seed again: it must be the same run");
   soak->add_flag("--replay", options->replay,
                  "Take each step again from its record: it must be decided the same");
-  soak->add_flag("--tell", options->tell, "A line for each change of state");
+  soak->add_flag("--tell", options->tell,
+                 "A line for each change of state, and the log of the daemon");
   return soak;
 }
 
