@@ -20,6 +20,8 @@ constexpr AlarmKind kKinds[] = {
     {kDdsBack, "DdsBack", kInfo, kNote},
     {kMetricsMissing, "MetricsMissing", kWarning, kOfHost},
     {kMetricsBack, "MetricsBack", kInfo, kNote},
+    {kJournalMissing, "JournalMissing", kWarning, kOfHost},
+    {kJournalBack, "JournalBack", kInfo, kNote},
     {kDdsCredentialsEnding, "DdsCredentialsEnding", kWarning, kOfHost},
     {kDdsCredentialsEnded, "DdsCredentialsEnded", kError, kOfHost},
     {kDdsCredentialsRenewed, "DdsCredentialsRenewed", kInfo, kNote},

@@ -28,6 +28,8 @@ enum class AlarmName : std::uint8_t {
   kDdsBack,
   kMetricsMissing,
   kMetricsBack,
+  kJournalMissing,
+  kJournalBack,
   kDdsCredentialsEnding,
   kDdsCredentialsEnded,
   kDdsCredentialsRenewed,

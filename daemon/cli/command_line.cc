@@ -45,7 +45,7 @@ const std::vector<Group>& Groups() {
   };
   return groups;
 }
-constexpr const char* kTools = "Tools";  // can, completion, help, store
+constexpr const char* kTools = "Tools";  // can, completion, help, incident, store
 
 /// Puts each command into its group. Help lists groups in the order of their first command.
 void AssignGroups(CLI::App* app) {
@@ -212,6 +212,7 @@ std::unique_ptr<CommandLine> MakeCommandLine(AddStudy add_study) {
   AddPageCommand(line.get());
   AddCanCommands(line.get());
   AddDoctorCommand(line.get());
+  AddIncidentCommand(line.get());
   AddCompletionCommand(line.get());
   AddHelpCommand(line.get());
   AssignGroups(&app);

@@ -82,6 +82,7 @@ void AddModelCommands(CommandLine* line);
 void AddStoreCommands(CommandLine* line);
 void AddAccessCommands(CommandLine* line);  // access, audit, token
 void AddDoctorCommand(CommandLine* line);
+void AddIncidentCommand(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 void AddHelpCommand(CommandLine* line);
 

@@ -1,6 +1,6 @@
 // The fields of plain values, in the order of their declaration, without a list of them: a type
 // that gets a field more is written, read and digested with it. This works for aggregates of up to
-// 18 fields, for the containers that they have, and for strong ids.
+// 22 fields, for the containers that they have, and for strong ids.
 //
 //   WriteFields(value, &bytes);            as bytes, little-endian as this machine is
 //   ReadFields(&reader, &value);           back again; false: the bytes are none of it
@@ -39,7 +39,7 @@ constexpr bool IsMadeOf(std::index_sequence<I...>) {
   return requires { T{(static_cast<void>(I), AnyValue{})...}; };
 }
 /// The number of fields of an aggregate.
-template <class T, std::size_t N = 18>
+template <class T, std::size_t N = 22>
 constexpr std::size_t FieldCount() {
   if constexpr (IsMadeOf<T>(std::make_index_sequence<N>()))
     return N;
@@ -106,10 +106,22 @@ void ForFields(T& value, const Each& each) {
   } else if constexpr (kFields == 17) {
     auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q] = value;
     all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q);
-  } else {
-    static_assert(kFields == 18, "a case for so many fields is missing here");
+  } else if constexpr (kFields == 18) {
     auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r] = value;
     all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r);
+  } else if constexpr (kFields == 19) {
+    auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s] = value;
+    all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s);
+  } else if constexpr (kFields == 20) {
+    auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t] = value;
+    all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t);
+  } else if constexpr (kFields == 21) {
+    auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u] = value;
+    all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u);
+  } else {
+    static_assert(kFields == 22, "a case for so many fields is missing here");
+    auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v] = value;
+    all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v);
   }
 }
 

@@ -14,7 +14,7 @@ namespace {
 /// none.
 struct RecordedPlan {
   std::uint64_t job = 0;
-  std::optional<Error> error;  // of a plan; an answer to a late move is made again
+  std::optional<Error> error;
 };
 
 /// Inputs that own what they name.
@@ -97,7 +97,10 @@ std::string RecordOf(const Inputs& inputs, const Effects& effects) {
                        .refused = Owned(inputs.refused)};
   for (const PlanDone& plan : inputs.plans) {
     owned.plans.push_back({plan.job, {}});
-    if (!plan.plan && !plan.late) owned.plans.back().error = plan.plan.error();
+    if (plan.late && !*plan.late)
+      owned.plans.back().error = plan.late->error();
+    else if (!plan.plan)
+      owned.plans.back().error = plan.plan.error();
   }
   std::string bytes;
   WriteFields(owned, &bytes);
@@ -125,8 +128,8 @@ Status Replayer::Step(std::string_view record) {
     if (job == jobs_.end())
       return Fail(ErrorCode::kInvalid,
                   fmt::format("record {} has the answer to a job that nobody gave", steps_ + 1));
-    plans.push_back(plan.error ? PlanFailed(job->second, *plan.error)
-                               : RunPlanJob(job->second, *layout_, coordinator_->drives()));
+    plans.push_back(plan.error ? PlanFailed(job->second.job, *plan.error)
+                               : RunPlanJob(job->second.job, *layout_, job->second.drives));
     jobs_.erase(job);
   }
   effects_.Clear();
@@ -143,7 +146,11 @@ Status Replayer::Step(std::string_view record) {
                      &effects_);
   ++steps_;
   const EffectsDigest now = PartsOf(effects_);
-  if (effects_.plan_job) jobs_[effects_.plan_job->job] = *effects_.plan_job;
+  now_ = inputs.now;
+  if (effects_.plan_job) {
+    const auto drives = coordinator_->drives();
+    jobs_[effects_.plan_job->job] = {*effects_.plan_job, {drives.begin(), drives.end()}};
+  }
   const std::pair<const char*, bool> parts[] = {{"rows", now.rows != recorded.rows},
                                                 {"frames", now.frames != recorded.frames},
                                                 {"jobs", now.jobs != recorded.jobs},

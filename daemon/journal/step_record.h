@@ -37,12 +37,19 @@ class Replayer {
   /// kRefused: it decided otherwise, with its number, its instant and what differs.
   Status Step(std::string_view record);
   [[nodiscard]] std::uint64_t steps() const { return steps_; }
+  [[nodiscard]] HostInstant now() const { return now_; }  // of the last step
 
  private:
+  /// A job with the drives that the planner got with it.
+  struct GivenJob {
+    PlanJob job;
+    std::vector<UnitDrive> drives;
+  };
   const Layout* layout_;
   std::unique_ptr<Coordinator> coordinator_;
-  std::map<std::uint64_t, PlanJob> jobs_;  // that have no answer yet
+  std::map<std::uint64_t, GivenJob> jobs_;  // that have no answer yet
   Effects effects_;
+  HostInstant now_;
   std::uint64_t steps_ = 0;
 };
 

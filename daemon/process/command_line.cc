@@ -12,8 +12,12 @@ const usage::HelpClosing kClosing{.manual = "focalfleetd"};
 
 const std::vector<std::pair<std::string, std::string>>& ExitCodes() {
   static const std::vector<std::pair<std::string, std::string>> codes = {
-      {"0", "ended by SIGTERM or SIGINT with everything stored, or --check found no fault"},
-      {"1", "could not start, or could not store everything; stderr has the reason"},
+      {"0",
+       "ended by SIGTERM or SIGINT with everything stored; --check found no fault, --replay no "
+       "difference"},
+      {"1",
+       "could not start, or could not store everything, or a step of --replay differs; stderr has "
+       "the reason"},
       {"2", "wrong usage"},
   };
   return codes;
@@ -30,11 +34,16 @@ std::unique_ptr<DaemonCommandLine> MakeDaemonCommandLine() {
   app.formatter(std::make_shared<usage::HelpFormatter>(kClosing));
   app.set_help_flag("-h,--help", "Show this help");
   app.set_version_flag("--version", std::string("focalfleetd ") + Version(), "Show the version");
-  app.add_option("--config", line->config, "The configuration, focalfleet.toml")
-      ->required()
-      ->type_name("FILE");
-  app.add_flag("--check", line->check,
-               "Read all files, print the effective configuration, and end");
+  CLI::Option* config =
+      app.add_option("--config", line->config, "The configuration, focalfleet.toml (required)")
+          ->type_name("FILE");
+  app.add_flag("--check", line->check, "Read all files, print the effective configuration, and end")
+      ->needs(config);
+  app.add_option("--replay", line->replay,
+                 "Replay a life of a daemon from a file of its journal, or the newest life in a "
+                 "folder, and end: each step must be decided as it was recorded")
+      ->type_name("FILE")
+      ->excludes(config);
   std::string footer = "Exit codes:";
   for (const auto& [code, text] : ExitCodes()) footer += "\n  " + code + "  " + text;
   footer +=
@@ -69,6 +78,7 @@ std::vector<usage::ManualPage> DaemonManual() {
                        {"JOURNAL_STREAM", "Of systemd: events go to the journal with fields."}},
        .files = {{"focalfleet.toml", "The configuration, see focalfleet.toml(5)."},
                  {"store.path", "The store, an SQLite file. One daemon at a time opens it."},
+                 {"store.path.journal", "All that the core took in, in files for --replay."},
                  {"control.socket", "The control socket, for owner and group."}},
        .see_also = "focalfleet(1), focalfleet-sim(1), focalfleet.toml(5), focalfleet-protocol(7)"});
 }

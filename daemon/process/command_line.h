@@ -14,6 +14,7 @@ struct DaemonCommandLine {
   CLI::App app;
   std::string config;
   bool check = false;
+  std::string replay;
 };
 
 std::unique_ptr<DaemonCommandLine> MakeDaemonCommandLine();

@@ -48,6 +48,9 @@ struct DaemonConfig {
     bool journal = true;  // events carry fields where standard error is the journal
     std::string file_at;  // file:line, for messages
   } log;
+  struct Journal {
+    std::uint32_t limit_MiB = 2048;  // of the folder <store.path>.journal; 0: there is no journal
+  } journal;
   struct Metrics {
     std::string address = "127.0.0.1";  // numeric
     std::uint16_t port = 0;             // 0: no metrics are served

@@ -106,6 +106,9 @@ void VisitKeys(Config* c, Visitor* visit) {
               "File of the log; empty: standard error; its folder must exist");
   visit->Flag("journal", &c->log.journal,
               "Whether events have fields in systemd's journal where standard error leads there");
+  visit->Section("journal", "All that the core takes in, in files for focalfleetd --replay");
+  visit->Whole("limit_MiB", &c->journal.limit_MiB, {0, 1'000'000},
+               "Limit of the folder <store.path>.journal, whose oldest files go; 0: no journal");
   visit->Section("metrics", "Numbers for Prometheus, at http://ADDRESS:PORT/metrics");
   visit->Text("address", &c->metrics.address,
               "Numeric address to listen at; whoever reaches it may read the page");

@@ -24,6 +24,7 @@
 #include "daemon/process/dds_setup.h"
 #include "daemon/process/fleet_setup.h"
 #include "daemon/process/http_door.h"
+#include "daemon/process/journal_setup.h"
 #include "daemon/process/log.h"
 #include "daemon/process/slow_end.h"
 #include "daemon/process/status_output.h"
@@ -118,6 +119,7 @@ class Daemon {
   std::function<void()> Answering(Heartbeat* heartbeat);
   void OpenService();
   StoreThread::Sinks StoreSinks();
+  std::function<void(const Inputs&, const Effects&)> Journalling();
   Status OpenRequestHandler();
   Status RestoreLastModel();
   void OpenMetrics();
@@ -137,6 +139,7 @@ class Daemon {
   StatusOutput status_;
   Measuring measuring_;
   Metrics metrics_;
+  std::unique_ptr<journal::JournalThread> journal_;  // none: [journal] has a limit of 0
   std::unique_ptr<Coordinator> coordinator_;
   std::unique_ptr<BusLines> lines_;
   StoreThreads stored_;
@@ -172,9 +175,12 @@ Status Daemon::Start() {
   FOCALFLEET_TRY_ASSIGN(measuring_.carriers, OpenFibreCarriers(config_.hall, *layout_));
   OpenStatusOutput(config_, *layout_, service_.started, clock_, &status_);
   OpenMetrics();
-  coordinator_ = std::make_unique<Coordinator>(
-      layout_.get(), std::vector<UnitDrive>(layout_->size(), config_.drive), config_.timing,
-      std::move(stored));
+  std::vector<UnitDrive> drives(layout_->size(), config_.drive);
+  FOCALFLEET_TRY_ASSIGN(journal_, OpenJournal(config_, *layout_, drives, stored, [this](auto note) {
+                          status_.troubles->Note(std::move(note));
+                        }));
+  coordinator_ = std::make_unique<Coordinator>(layout_.get(), std::move(drives), config_.timing,
+                                               std::move(stored));
   return StartThreads();
 }
 
@@ -273,6 +279,12 @@ StoreThread::Sinks Daemon::StoreSinks() {
   return sinks;
 }
 
+std::function<void(const Inputs&, const Effects&)> Daemon::Journalling() {
+  return [journal = journal_.get()](const Inputs& inputs, const Effects& effects) {
+    if (journal != nullptr) journal->Take(inputs, effects);
+  };
+}
+
 /// A thread that answers wakes the core, which waits for the answer.
 std::function<void()> Daemon::Answering(Heartbeat* heartbeat) {
   return [this, heartbeat] {
@@ -325,7 +337,8 @@ Status Daemon::StartThreads() {
                                                             .sync = sync_.get(),
                                                             .troubles = status_.troubles.get(),
                                                             .service = service_.report.get(),
-                                                            .clock = clock_},
+                                                            .clock = clock_,
+                                                            .stepped = Journalling()},
                                                   .threads = signal_.get(),
                                                   .hang_up = &ReopenLog}));
   ServeMetrics();
@@ -413,6 +426,7 @@ Status Daemon::End() {
                                     {"the planner", [this] { planner_.reset(); }},
                                     {"the camera", [this] { measuring_.thread.reset(); }},
                                     {"the metrics", [this] { metrics_.endpoint.reset(); }},
+                                    {"the journal", [this] { journal_.reset(); }},
                                     {"HTTP", [this] { doors_.http.reset(); }},
                                     // A question that runs is cut short.
                                     {"the reader", [this] { stored_.reader.reset(); }}});

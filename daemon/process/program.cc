@@ -8,6 +8,7 @@
 #include "daemon/process/command_line.h"
 #include "daemon/process/config.h"
 #include "daemon/process/daemon.h"
+#include "daemon/process/journal_setup.h"
 #include "daemon/usage/complaint.h"
 
 namespace focalfleet {
@@ -40,6 +41,11 @@ int RunFocalfleetd(int argc, char** argv) {
                                                  " (`focalfleetd --help` shows the usage)"},
                        kUsage);
   }
+  if (!line->replay.empty()) return ReplayAndPrint(line->replay);
+  if (line->config.empty())
+    return ReportAtEnd(
+        {ErrorCode::kInvalid, "--config is required (`focalfleetd --help` shows the usage)"},
+        kUsage);
   const auto config = LoadConfig(line->config);
   if (!config) return ReportAtEnd(config.error());
   if (line->check) return Check(*config);

@@ -308,6 +308,7 @@ def operate(s):
                     stdout=open("watch.jsonl", "w", encoding="utf-8"), stderr=subprocess.DEVNULL)
     s.ask("watch --once --domain", s.domain)
     s.ask("doctor --config focalfleet.toml", exits=(0, 1, 3))
+    s.ask("incident --config focalfleet.toml --out incident.tar.gz", command="incident", exits=(0, 3))
     s.ask("wait")
     s.ask("apply targets.csv --dry-run", exits=(0, 3))
     s.ask("apply targets.csv --wait --correct 1", exits=(0, 3))
