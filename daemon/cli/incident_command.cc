@@ -36,7 +36,7 @@ struct Part {
   std::uintmax_t bytes = 0;
 };
 
-/// The folder that becomes the file. It goes with this object.
+/// The folder that becomes the file. The folder goes with this object.
 class Collection {
  public:
   explicit Collection(fs::path folder) : folder_(std::move(folder)) {}
@@ -61,7 +61,7 @@ class Collection {
     if (!fs::copy_file(from, folder_ / part, error) || error)
       Miss(part, from.string() + ": " + error.message());
   }
-  /// What a program prints. `exits`: the greatest exit code with which it has done its work.
+  /// Adds what a program prints. `exits`: the greatest exit code with which it has done its work.
   void Ask(const std::vector<std::string>& arguments, const std::string& part, int exits = 0) {
     const auto code = RunChild(arguments, folder_ / part);
     if (!code) return Miss(part, code.error().text);
@@ -109,7 +109,7 @@ void TakeLog(const DaemonConfig& config, WallTime since, Collection* collection)
                   "daemon.log");
 }
 
-/// What the daemon and the doctor say. This program asks them as its user would.
+/// Takes what daemon and doctor say. This program asks them as its user would.
 void TakeAnswers(const Context& context, const IncidentOptions& options, WallTime since,
                  Collection* collection) {
   std::vector<std::string> own{"/proc/self/exe", "--json"};

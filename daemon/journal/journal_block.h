@@ -1,4 +1,4 @@
-// One block of a journal's file; journal_file.h has the format.
+// A block of a journal's file; journal_file.h has the format.
 #pragma once
 
 #include <cstdint>

@@ -9,7 +9,7 @@
 namespace focalfleet::journal {
 namespace {
 
-/// So much of a killed daemon's last steps may be missing. With half of it a quiet daemon would
+/// A killed daemon's journal may lack this much of its end. With half of it a quiet daemon would
 /// wake eight times a second for nothing.
 constexpr std::chrono::milliseconds kWriteEvery{250};
 constexpr std::size_t kWaitingMax = 1 << 16;

@@ -78,6 +78,7 @@ struct Doors {
 };
 
 struct StoreThreads {
+  std::unique_ptr<journal::JournalThread> journal;  // none: [journal] has a limit of 0
   std::unique_ptr<StoreThread> writer;
   std::unique_ptr<ReaderThread> reader;
 };
@@ -102,6 +103,12 @@ ShellNote NoteOfMetrics(const std::string& trouble) {
           "no metrics, the fleet works on and it is tried again: " + trouble};
 }
 
+std::function<void(const Inputs&, const Effects&)> Journalling(journal::JournalThread* journal) {
+  return [journal](const Inputs& inputs, const Effects& effects) {
+    if (journal != nullptr) journal->Take(inputs, effects);
+  };
+}
+
 class Daemon {
  public:
   explicit Daemon(const DaemonConfig& config) : config_(config), clock_(config.clock.speed) {}
@@ -119,7 +126,6 @@ class Daemon {
   std::function<void()> Answering(Heartbeat* heartbeat);
   void OpenService();
   StoreThread::Sinks StoreSinks();
-  std::function<void(const Inputs&, const Effects&)> Journalling();
   Status OpenRequestHandler();
   Status RestoreLastModel();
   void OpenMetrics();
@@ -139,7 +145,6 @@ class Daemon {
   StatusOutput status_;
   Measuring measuring_;
   Metrics metrics_;
-  std::unique_ptr<journal::JournalThread> journal_;  // none: [journal] has a limit of 0
   std::unique_ptr<Coordinator> coordinator_;
   std::unique_ptr<BusLines> lines_;
   StoreThreads stored_;
@@ -176,9 +181,9 @@ Status Daemon::Start() {
   OpenStatusOutput(config_, *layout_, service_.started, clock_, &status_);
   OpenMetrics();
   std::vector<UnitDrive> drives(layout_->size(), config_.drive);
-  FOCALFLEET_TRY_ASSIGN(journal_, OpenJournal(config_, *layout_, drives, stored, [this](auto note) {
-                          status_.troubles->Note(std::move(note));
-                        }));
+  FOCALFLEET_TRY_ASSIGN(
+      stored_.journal, OpenJournal(config_, *layout_, drives, stored,
+                                   [this](auto note) { status_.troubles->Note(std::move(note)); }));
   coordinator_ = std::make_unique<Coordinator>(layout_.get(), std::move(drives), config_.timing,
                                                std::move(stored));
   return StartThreads();
@@ -279,12 +284,6 @@ StoreThread::Sinks Daemon::StoreSinks() {
   return sinks;
 }
 
-std::function<void(const Inputs&, const Effects&)> Daemon::Journalling() {
-  return [journal = journal_.get()](const Inputs& inputs, const Effects& effects) {
-    if (journal != nullptr) journal->Take(inputs, effects);
-  };
-}
-
 /// A thread that answers wakes the core, which waits for the answer.
 std::function<void()> Daemon::Answering(Heartbeat* heartbeat) {
   return [this, heartbeat] {
@@ -321,26 +320,27 @@ Status Daemon::StartThreads() {
             signal_.get(), {.name = "camera", .alive = Answering(&service_.camera)}));
   }
   OpenService();
-  FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.shell = {.layout = layout_.get(),
-                                                            .coordinator = coordinator_.get(),
-                                                            .lines = lines_.get(),
-                                                            .handler = doors_.handler.get(),
-                                                            .models = models_.get(),
-                                                            .alarms = &alarms_,
-                                                            .audit = &doors_.audit,
-                                                            .planner = planner_.get(),
-                                                            .camera = measuring_.thread.get(),
-                                                            .store = &stored_.writer->writer(),
-                                                            .reader = stored_.reader.get(),
-                                                            .scheduler = status_.scheduler.get(),
-                                                            .metrics = metrics_.sampler.get(),
-                                                            .sync = sync_.get(),
-                                                            .troubles = status_.troubles.get(),
-                                                            .service = service_.report.get(),
-                                                            .clock = clock_,
-                                                            .stepped = Journalling()},
-                                                  .threads = signal_.get(),
-                                                  .hang_up = &ReopenLog}));
+  FOCALFLEET_TRY_ASSIGN(loop_,
+                        EventLoop::Create({.shell = {.layout = layout_.get(),
+                                                     .coordinator = coordinator_.get(),
+                                                     .lines = lines_.get(),
+                                                     .handler = doors_.handler.get(),
+                                                     .models = models_.get(),
+                                                     .alarms = &alarms_,
+                                                     .audit = &doors_.audit,
+                                                     .planner = planner_.get(),
+                                                     .camera = measuring_.thread.get(),
+                                                     .store = &stored_.writer->writer(),
+                                                     .reader = stored_.reader.get(),
+                                                     .scheduler = status_.scheduler.get(),
+                                                     .metrics = metrics_.sampler.get(),
+                                                     .sync = sync_.get(),
+                                                     .troubles = status_.troubles.get(),
+                                                     .service = service_.report.get(),
+                                                     .clock = clock_,
+                                                     .stepped = Journalling(stored_.journal.get())},
+                                           .threads = signal_.get(),
+                                           .hang_up = &ReopenLog}));
   ServeMetrics();
   doors_.diagnosis = std::make_unique<DiagnosisJob>(DiagnosisJob::Options{
       .programs = StudyPrograms(), .folder = config_.store.path + ".diagnosis"});
@@ -426,7 +426,7 @@ Status Daemon::End() {
                                     {"the planner", [this] { planner_.reset(); }},
                                     {"the camera", [this] { measuring_.thread.reset(); }},
                                     {"the metrics", [this] { metrics_.endpoint.reset(); }},
-                                    {"the journal", [this] { journal_.reset(); }},
+                                    {"the journal", [this] { stored_.journal.reset(); }},
                                     {"HTTP", [this] { doors_.http.reset(); }},
                                     // A question that runs is cut short.
                                     {"the reader", [this] { stored_.reader.reset(); }}});

@@ -81,9 +81,16 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
 }
 
 std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
-                               const UnitExpectation& expectation, double sigma_mm) {
+                               const UnitExpectation& expectation, double sigma_mm,
+                               double clearance_mm) {
   const auto at_fp = InReach(unit, seen_fp, kStraySlackMm);
   if (!at_fp) return std::nullopt;
+  // An error across the line from base to fibre turns theta, and with it the elbow. Four standard
+  // deviations: one lost unit of 16,000 is taken for known too early. With two it would be one of
+  // 20; with eight, twice as large a circle around the base has to be homed.
+  const double from_base_mm =
+      std::hypot(at_fp->x_mm - unit.base_fp.x_mm, at_fp->y_mm - unit.base_fp.y_mm);
+  if (4 * sigma_mm * unit.theta().arm_mm > clearance_mm * from_base_mm) return std::nullopt;
   std::vector<AxisAngles> possible = AnglesFor(unit, *at_fp);
   if (expectation.within)
     std::erase_if(possible,
@@ -124,7 +131,7 @@ Result<ExposureFindings> FindUnits(std::uint64_t id, const Layout& layout, const
       measurement.covariance = seen.covariance;
       if (IsCertain(seen.status) && expectations[n].lost)
         measurement.place = PoseOfLost(layout.units()[n], believed.drives[n], seen.at_fp,
-                                       expectations[n], sigma_mm);
+                                       expectations[n], sigma_mm, layout.clearance_mm());
       else if (IsCertain(seen.status))
         measurement.place =
             PlaceSeen(layout.units()[n], believed.drives[n], seen.at_fp,

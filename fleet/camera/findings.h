@@ -35,9 +35,11 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
 
 /// The pose, in vectors, of a unit of unknown place that is seen at `seen_fp`. Empty: its arms do
 /// not reach there, or more than one whole turn or elbow side is possible and neither its interval
-/// nor its own report decides.
+/// nor its own report decides, or the fibre is so near its base that the elbow may be off by
+/// `clearance_mm` at four standard deviations: a folded arm points anywhere.
 std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
-                               const UnitExpectation& expectation, double sigma_mm);
+                               const UnitExpectation& expectation, double sigma_mm,
+                               double clearance_mm);
 
 /// The measurements, one for each unit of the layout. A place is given where the status is certain
 /// and the arms reach it. A unit of unknown place gets one where a single pose is possible there

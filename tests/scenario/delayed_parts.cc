@@ -93,7 +93,7 @@ ExposureDone DelayedCamera::Expose(const ExposureJob& job, const Layout& layout,
       measurement.place = PlaceSeen(layout.units()[n], drives[n], seen, PlaceOf(job.expected[n]));
     else
       measurement.place = PoseOfLost(layout.units()[n], drives[n], seen, expected[n],
-                                     options_.centroid_sigma_um * 1e-3);
+                                     options_.centroid_sigma_um * 1e-3, layout.clearance_mm());
     exposure.measurements.push_back(measurement);
   }
   return {job.id, std::move(exposure)};
