@@ -12,7 +12,8 @@ namespace {
 constexpr bool IsOfUpload(const CanFrame& frame) {
   const auto function = static_cast<Function>(frame.id >> 20 & 63);
   return function == Function::kStageBegin || function == Function::kStageSegment ||
-         function == Function::kConfirm || function == Function::kArm;
+         function == Function::kConfirm || function == Function::kArm ||
+         function == Function::kProgress;
 }
 
 }  // namespace

@@ -126,8 +126,13 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
   UnitRecord& record = fleet.units[i];
   UnitView& view = record.view;
   const Reading& reading = record.reading;
-  const Reconciled result = Reconcile(
-      {reading.status, fleet.units.PlaceAt(i, reading.position), reading.subdivision}, store);
+  // The unit tells of a restart once. A run that ended before it had stored what follows from it
+  // leaves nothing but the open intent.
+  StatusReply status = reading.status;
+  status.restarted = std::exchange(record.restarted, false) ||
+                     (store.intent && !fleet.ledger.IsOfThisRun(*store.intent));
+  const Reconciled result =
+      Reconcile({status, fleet.units.PlaceAt(i, reading.position), reading.subdivision}, store);
   if (result.intent_end) fleet.ledger.EndIntent(fleet.units[i].view.serial, *result.intent_end);
   // The `done` was lost, but the unit stands short of its end, and nothing but a stop leaves it
   // there.

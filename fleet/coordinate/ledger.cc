@@ -20,6 +20,7 @@ Ledger::Ledger(const Layout& layout, const CoordinatorConfig& config, StoredFlee
       step_(step),
       alarms_(layout, config, stored, step),
       next_configuration_(stored.next_configuration),
+      first_configuration_(stored.next_configuration),
       next_exposure_(stored.next_exposure),
       next_move_(stored.next_move) {
   for (const auto& row : stored.vectors) vectors[row.serial] = row;

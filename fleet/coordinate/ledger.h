@@ -52,6 +52,10 @@ class Ledger {
   MoveId TakeMoveId();
   [[nodiscard]] bool MovesAreReserved() const { return committed_through_ >= reserved_by_; }
   std::uint64_t TakeConfigurationId() { return next_configuration_++; }
+  /// The intent was made since this daemon started.
+  [[nodiscard]] bool IsOfThisRun(const IntentRow& intent) const {
+    return intent.configuration >= first_configuration_;
+  }
   std::uint64_t TakeExposureId() { return next_exposure_++; }
 
   void BeginStep(std::uint64_t committed_through, bool store_failing);
@@ -80,6 +84,7 @@ class Ledger {
   bool store_failing_ = false;
   std::uint64_t next_batch_ = 1;
   std::uint64_t next_configuration_ = 1;
+  std::uint64_t first_configuration_ = 1;  // of this run
   std::uint64_t next_exposure_ = 1;
   MoveId next_move_;
   std::uint32_t moves_left_ = 0;

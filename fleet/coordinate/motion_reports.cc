@@ -128,6 +128,7 @@ void OnStatus(const Coordination& fleet, PositionerIndex i, const StatusReply& s
   UnitRecord& record = fleet.units[i];
   UnitView& view = record.view;
   view.reported_state = status.state;
+  record.restarted = record.restarted || status.restarted;
   view.fault = status.fault;
   view.move = status.move;
   fleet.units.Changed(i);

@@ -114,6 +114,7 @@ struct UnitRecord {
   UnitTrouble trouble;
   MotionState motion;
   HostInstant next_poll{INT64_MIN};
+  bool restarted = false;   // by its status, since its place was settled last
   bool asked_once = false;  // has had the chance to answer since start
   ClockMap clock;
   bool clock_reported = false;  // an alarm has said that its clock is off by more than plans allow

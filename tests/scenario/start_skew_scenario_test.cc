@@ -118,7 +118,7 @@ TEST(StartSkew, BeyondTheToleranceIsReportedAndPlannedWithNextTime) {
       [&] {
         std::uint32_t armed = 0;
         for (std::uint32_t n = 0; n < fleet.layout().size(); ++n)
-          armed += fleet.world().Truth(n).state == UnitState::kArmed ? 1u : 0u;
+          armed += fleet.coordinator().unit({n}).phase == UnitPhase::kArmed ? 1u : 0u;
         return armed == fleet.layout().size();
       },
       Seconds(60)));

@@ -67,6 +67,7 @@ export async function past(browser) {
   await apply(tab, "night-2.csv");
   await textOf(tab, "#fleet-summary", /moving/);
   await tab.waitForFunction(() => window.focalfleetPage.plate.turning.size > 20);
+  await tab.waitForTimeout(300);  // the signal comes 0.25 s of the fleet's time before the start
   await tab.click("#stop");
   await textOf(tab, "#configuration", /night-2.csv \(configuration 2\) is stopped/);
   await textOf(tab, "#fleet-summary", `${given.count} ready`);  // all have said where they stand

@@ -31,31 +31,34 @@ IntentRow Intent() {
 }
 
 TEST(Reconcile, EveryCombinationIsTruthful) {
-  for (const bool interrupted : {false, true})
-    for (const bool began : {false, true})
-      for (const Pose position : {kFrom, kTo, kElsewhere})
-        for (const bool intent : {false, true}) {
-          StoreSays store{.vector = Stored(Exactly(Witness::kReported, kFrom))};
-          if (intent) store.intent = Intent();
-          const Reconciled result =
-              Reconcile(Unit(interrupted, began ? kOurs : kEarlier, position), store);
-          const bool place = IsPlace(result.knowledge);
-          if (interrupted) {
-            EXPECT_FALSE(place);
-            EXPECT_EQ(result.knowledge[0].witness == Witness::kInterval, intent && began);
-          } else if (intent && began) {
-            // A unit that ended by itself counts from elsewhere than where it began.
-            EXPECT_EQ(place, position != kFrom);
-          } else {
-            EXPECT_EQ(place, position == kFrom);
-          }
-          if (place) {
-            EXPECT_EQ(PlaceOf(result.knowledge), position);
-          } else {
-            EXPECT_STRNE(result.reason, "");
-          }
-          EXPECT_EQ(result.intent_end.has_value(), intent);
-        }
+  for (int bits = 0; bits < 16; ++bits) {
+    const bool interrupted = (bits & 1) != 0, began = (bits & 2) != 0;
+    const bool intent = (bits & 4) != 0, restarted = (bits & 8) != 0;
+    for (const Pose position : {kFrom, kTo, kElsewhere}) {
+      StoreSays store{.vector = Stored(Exactly(Witness::kReported, kFrom))};
+      if (intent) store.intent = Intent();
+      UnitSays unit = Unit(interrupted, began ? kOurs : kEarlier, position);
+      unit.status.restarted = restarted;
+      const Reconciled result = Reconcile(unit, store);
+      const bool place = IsPlace(result.knowledge);
+      if (interrupted) {
+        EXPECT_FALSE(place);
+        EXPECT_EQ(result.knowledge[0].witness == Witness::kInterval, intent && began);
+      } else if (intent && began) {
+        // A unit that ended by itself counts from elsewhere than where it began, unless it was
+        // stopped before its first step.
+        EXPECT_EQ(place, position != kFrom || !restarted);
+      } else {
+        EXPECT_EQ(place, position == kFrom);
+      }
+      if (place) {
+        EXPECT_EQ(PlaceOf(result.knowledge), position);
+      } else {
+        EXPECT_STRNE(result.reason, "");
+      }
+      EXPECT_EQ(result.intent_end.has_value(), intent);
+    }
+  }
 }
 
 TEST(Reconcile, IntentEndsAsWhatHappened) {

@@ -74,6 +74,8 @@ class EndlessUnit {
                           .segments = {staged_.path[0].size(), staged_.path[1].size()}});
     } else if (std::holds_alternative<Arm>(message)) {
       answer(ArmReply{.move = staged_.move});
+    } else if (std::holds_alternative<ProgressRequest>(message)) {
+      answer(ProgressReply{.state = UnitState::kArmed, .position = {0, 0}, .move = begun_});
     } else if (const auto* start = std::get_if<Start>(&message)) {
       if (start->move != staged_.move) return;
       begun_ = start->move;
