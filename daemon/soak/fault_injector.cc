@@ -229,7 +229,7 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
   const auto power_cut = [&](std::size_t which) {
     const UnitId each = units[which].id;
     disturb.PowerCut(each);
-    parts_.troubles->shifted[which] = true;
+    parts_.troubles->jumps[which].push_back(now_);
     Until(end, [this, each] { parts_.plant->world().disturb().PowerOn(each); });
   };
   const auto deaf = [&](std::size_t which) {
@@ -293,7 +293,7 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
   const bool exchanged = site == kUnitForeign || site == kUnitSerialZero;
   const auto power_cycle = [this, unit, row, exchanged] {
     if (!exchanged) return;
-    parts_.troubles->shifted[row] = true;
+    parts_.troubles->jumps[row].push_back(now_);
     parts_.plant->world().disturb().PowerCut(unit);
     parts_.plant->world().disturb().PowerOn(unit);
   };

@@ -20,8 +20,8 @@ constexpr std::size_t kBrokenMax = 20;
 constexpr double kLagVectors = 24;
 /// The same where a camera finds the unit; its error is largest near the folded arm.
 constexpr double kSeenVectors = 400;
-/// After a power cut a rotor settles where its field is applied anew, within half a turn of it. A
-/// rotor at its stop is ahead of or behind a field that turns on by as much, and the daemon takes
+/// After each power cut a rotor settles where its field is applied anew, within half a turn of it.
+/// A rotor at its stop is ahead of or behind a field that turns on by as much, and the daemon takes
 /// the way of an open move for so much wider.
 constexpr double kJumpVectors = 60;
 constexpr DurationNs kStopWithin = Milliseconds(150);
@@ -126,7 +126,8 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
   in_flight_.reset();
   for (const Row& row : rows)
     if (const auto* vector = std::get_if<VectorRow>(&row)) {
-      first_stored_.try_emplace(vector->serial.value, HostInstant{ReadVirtualNs()});
+      const HostInstant at{ReadVirtualNs()};
+      stored_.try_emplace(vector->serial.value, Stored{at, at}).first->second.last = at;
       auto& places = reported_[vector->serial.value];
       places.push_back(PlaceOf(*vector));
       if (places.size() > kReportedMax) places.pop_front();
@@ -291,12 +292,18 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
   // Other hardware at this place has a place of its own; the store speaks of what was bound here.
   if (serial != plant_->world().flash(truth.id).serial.value) return;
   // At its first contact a unit has no witness but its own counts.
-  const auto first = first_stored_.find(serial);
+  const auto known = stored_.find(serial);
   if (troubles_->counts_lost[row] != Troubles::kLongAgo &&
-      (first == first_stored_.end() || troubles_->counts_lost[row] <= first->second))
+      (known == stored_.end() || troubles_->counts_lost[row] <= known->second.first))
     return;
   const auto place = shadow_.places.find(serial);
   const auto intent = shadow_.intents.find(serial);
+  const std::vector<HostInstant>& cuts = troubles_->jumps[row];
+  const auto since = std::ranges::count_if(
+      cuts, [&](HostInstant cut) { return known == stored_.end() || cut > known->second.last; });
+  double slack = slack_vectors_;
+  if (!cuts.empty() || intent != shadow_.intents.end())
+    slack = std::max(slack, kJumpVectors * static_cast<double>(std::max<std::ptrdiff_t>(since, 1)));
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     double low = -1e18, high = 1e18;
     if (intent != shadow_.intents.end()) {
@@ -307,8 +314,7 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
       high = static_cast<double>(place->second[axis].high);
     }
     const double off = std::max(low - truth.vectors[axis], truth.vectors[axis] - high);
-    const bool jumps = troubles_->shifted[row] || intent != shadow_.intents.end();
-    if (off <= std::max(slack_vectors_, jumps ? kJumpVectors : 0.0)) continue;
+    if (off <= slack) continue;
     Broken("place",
            fmt::format("unit {} axis {} is at {:.1f}, stored is {}{:.0f}..{:.0f}", truth.id.value,
                        axis, truth.vectors[axis],

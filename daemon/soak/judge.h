@@ -88,9 +88,13 @@ class Judge {
   PictureReader reader_;
   std::optional<StoredPicture> durable_;
   std::uint64_t durable_syncs_ = UINT64_MAX;
-  StoredPicture shadow_;                               // acknowledged
-  std::optional<StoredPicture> in_flight_;             // with the batch that is being committed
-  std::map<std::uint32_t, HostInstant> first_stored_;  // by serial
+  StoredPicture shadow_;                    // acknowledged
+  std::optional<StoredPicture> in_flight_;  // with the batch that is being committed
+  struct Stored {
+    HostInstant first;
+    HostInstant last;
+  };
+  std::map<std::uint32_t, Stored> stored_;                     // times of places, by serial
   std::map<std::uint32_t, std::deque<StoredPlace>> reported_;  // acknowledged places, newest last
   using Move = std::pair<std::uint32_t, std::uint32_t>;        // unit, move
   std::set<Move> allowed_;                                     // by a durable intent

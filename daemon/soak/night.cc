@@ -37,7 +37,7 @@ Night::Night(const Draws& draws, const NightOptions& options)
   troubles_.buses.assign(plant_->layout().buses().size(), Troubles::kLongAgo);
   troubles_.deaf.assign(units, Troubles::kLongAgo);
   troubles_.units.assign(units, Troubles::kLongAgo);
-  troubles_.shifted.assign(units, false);
+  troubles_.jumps.resize(units);
   troubles_.counts_lost.assign(units, Troubles::kLongAgo);
   judge_ = std::make_unique<Judge>(plant_.get(), disk_.get(), &troubles_, draws_.camera);
   faults_ = std::make_unique<FaultInjector>(
