@@ -110,16 +110,16 @@ void TakeLog(const DaemonConfig& config, WallTime since, Collection* collection)
 }
 
 /// Takes what daemon and doctor say. This program asks them as its user would.
-void TakeAnswers(const Context& context, const IncidentOptions& options, WallTime since,
-                 Collection* collection) {
-  std::vector<std::string> own{"/proc/self/exe", "--json"};
-  if (!context.NamedSocketPath().empty())
-    own.insert(own.end(), {"--socket", context.NamedSocketPath()});
+void TakeAnswers(const Context& context, const DaemonConfig& config, const std::string& config_path,
+                 WallTime since, Collection* collection) {
+  const std::string named = context.NamedSocketPath();
+  const std::vector<std::string> own{"/proc/self/exe", "--json", "--socket",
+                                     named.empty() ? config.control.socket : named};
   const auto ask = [&](std::vector<std::string> more, const char* part, int exits) {
     more.insert(more.begin(), own.begin(), own.end());
     collection->Ask(more, part, exits);
   };
-  ask({"doctor", "--config", options.config}, "doctor.json", 3);
+  ask({"doctor", "--config", config_path}, "doctor.json", 3);
   ask({"status"}, "status.json", 3);
   ask({"alarms"}, "alarms.json", 3);
   ask({"events", "--limit", "1000", "--since", ToIso8601(since)}, "events.json", 3);
@@ -189,7 +189,7 @@ ExitCode RunIncident(const Context& context, const IncidentOptions& options) {
   TakeFiles(*config, options, &collection);
   TakeJournal(config->store.path + ".journal", *since, &collection);
   TakeLog(*config, *since, &collection);
-  TakeAnswers(context, options, *since, &collection);
+  TakeAnswers(context, *config, options.config, *since, &collection);
   const Json about{{"made", ToIso8601(now)},
                    {"since", ToIso8601(*since)},
                    {"version", ClientVersion()},

@@ -67,10 +67,10 @@ void OnMotionStatus(const Coordination& fleet, PositionerIndex i, const StatusRe
 
 /// A unit that restarted in mid-move answers a stop with the vectors in its FLASH, where the move
 /// began. The same answer comes from a unit that was stopped before its first step; its status says
-/// which one it is.
+/// which one it is. A move may also end where it began, having made way for another unit.
 bool CountsFromItsBeginning(const Done& done, const IntentRow& intent) {
   return (done.outcome == Outcome::kStopped || done.outcome == Outcome::kFault) &&
-         done.position == intent.from && intent.from != intent.to;
+         done.position == intent.from;
 }
 
 void MotionEnded(const Coordination& fleet, PositionerIndex i, const Done& done) {

@@ -20,7 +20,7 @@ Reconciled AfterIntent(const UnitSays& unit, const IntentRow& intent, bool homes
   // FLASH gets the final vectors at the end of a motion. A unit that began, restarted and counts as
   // where it began has lost its mark together with its power: it may stand anywhere on its way.
   // Without a restart it was stopped before its first step.
-  if (began && unit.status.restarted && unit.position == intent.from && intent.from != intent.to)
+  if (began && unit.status.restarted && unit.position == intent.from)
     return {InterruptedHull(intent, unit.subdivision), IntentEnd::kInterrupted,
             "it counts from where its last move began, though it began"};
   // The rotor may have met its stop and slipped while the vectors went on, and where homing began
