@@ -70,6 +70,12 @@ TEST(Regression, Seed15_AUnitThatIsLostBeforeItHomesIsLeftOut) { ExpectKept(15);
 // A unit of unknown place, whose homing was cut short unheard, counted from anywhere.
 TEST(Regression, Seed17_HomingThatWasCutShortLeavesNoPlace) { ExpectKept(17); }
 
+// A unit that makes way and comes back restarted on the way.
+TEST(Regression, Seed119_AMoveThatEndsWhereItBeganIsNotOverAtItsBeginning) { ExpectKept(119, 12); }
+
+// The camera found a lost unit with its arm folded, and theta was anything.
+TEST(Regression, Seed121_AFoldedArmIsNotMeasured) { ExpectKept(121); }
+
 // A unit restarted at rest with counts of an earlier copy of its FLASH, and got a move before it
 // was polled.
 TEST(Regression, Seed42_AUnitThatCountsFromElsewhereDoesNotBegin) { ExpectKept(42); }
