@@ -11,7 +11,8 @@
 
 namespace focalfleet::cli {
 
-Result<int> RunChild(const std::vector<std::string>& arguments, const std::string& output) {
+Result<int> RunChild(const std::vector<std::string>& arguments, const std::string& output,
+                     const std::string& errors) {
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
@@ -19,7 +20,8 @@ Result<int> RunChild(const std::vector<std::string>& arguments, const std::strin
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, 1, output.c_str(), O_WRONLY | O_CREAT | O_EXCL, 0600);
-  posix_spawn_file_actions_adddup2(&actions, 1, 2);
+  posix_spawn_file_actions_addopen(&actions, 2, errors.c_str(), O_WRONLY | O_CREAT | O_APPEND,
+                                   0600);
   pid_t pid = -1;
   const int failed = ::posix_spawnp(&pid, argv.front(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);

@@ -8,9 +8,10 @@
 
 namespace focalfleet::cli {
 
-/// Runs a program, looked for in PATH, with its output in the new file `output` and its errors
-/// behind it. Returns its exit code. Errors: kUnavailable: it cannot be started, or a signal ended
-/// it.
-Result<int> RunChild(const std::vector<std::string>& arguments, const std::string& output);
+/// Runs a program, looked for in PATH, with its output in the new file `output`; its errors are
+/// appended to `errors`. Returns its exit code. Errors: kUnavailable: it cannot be started, or a
+/// signal ended it.
+Result<int> RunChild(const std::vector<std::string>& arguments, const std::string& output,
+                     const std::string& errors);
 
 }  // namespace focalfleet::cli

@@ -63,7 +63,7 @@ class Collection {
   }
   /// Adds what a program prints. `exits`: the greatest exit code with which it has done its work.
   void Ask(const std::vector<std::string>& arguments, const std::string& part, int exits = 0) {
-    const auto code = RunChild(arguments, folder_ / part);
+    const auto code = RunChild(arguments, folder_ / part, folder_ / "errors.txt");
     if (!code) return Miss(part, code.error().text);
     if (*code > exits) Miss(part, fmt::format("{} ended with {}", arguments.front(), *code));
   }
@@ -144,10 +144,11 @@ Status Pack(const Collection& collection, const std::string& out) {
   const fs::path folder = collection.folder();
   const std::string errors = folder.parent_path() / "tar.txt";
   const std::string packed = folder.parent_path() / "packed.tar.gz";
-  FOCALFLEET_TRY_ASSIGN(const int code, RunChild({"tar", "--create", "--gzip", "--file", packed,
-                                                  "--owner=0", "--group=0", "--directory",
-                                                  folder.parent_path(), folder.filename()},
-                                                 errors));
+  FOCALFLEET_TRY_ASSIGN(
+      const int code,
+      RunChild({"tar", "--create", "--gzip", "--force-local", "--file", packed, "--owner=0",
+                "--group=0", "--directory", folder.parent_path(), folder.filename()},
+               folder.parent_path() / "tar.out", errors));
   if (code != 0) {
     const auto why = ReadFile(errors);
     return Fail(ErrorCode::kUnavailable, out + ": tar: " + (why ? *why : std::string()));

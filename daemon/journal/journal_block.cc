@@ -18,9 +18,10 @@ struct Header {
   std::uint32_t records = 0;
   std::uint32_t unpacked_bytes = 0;
   std::uint32_t packed_bytes = 0;
-  std::uint32_t crc = 0;  // of the header with 0 here, and of the packed bytes
+  std::uint32_t packed_crc = 0;  // of the packed bytes
+  std::uint32_t header_crc = 0;  // of the header with 0 here
 };
-constexpr std::size_t kHeaderBytes = 32;
+constexpr std::size_t kHeaderBytes = 36;
 
 std::string BytesOf(const Header& header) {
   std::string bytes;
@@ -28,14 +29,13 @@ std::string BytesOf(const Header& header) {
   return bytes;
 }
 
-std::uint32_t CrcOf(Header header, std::string_view packed) {
-  header.crc = 0;
-  const std::string front = BytesOf(header);
-  const auto more = [](uLong crc, std::string_view bytes) {
-    return ::crc32(crc, reinterpret_cast<const Bytef*>(bytes.data()),
-                   static_cast<uInt>(bytes.size()));
-  };
-  return static_cast<std::uint32_t>(more(more(0, front), packed));
+std::uint32_t CrcOf(std::string_view bytes) {
+  return static_cast<std::uint32_t>(
+      ::crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
+}
+std::uint32_t CrcOf(Header header) {
+  header.header_crc = 0;
+  return CrcOf(BytesOf(header));
 }
 
 }  // namespace
@@ -52,7 +52,8 @@ std::string Packed(const Block& block) {
                 .records = block.records,
                 .unpacked_bytes = static_cast<std::uint32_t>(block.bytes.size()),
                 .packed_bytes = static_cast<std::uint32_t>(packed.size())};
-  header.crc = CrcOf(header, packed);
+  header.packed_crc = CrcOf(packed);
+  header.header_crc = CrcOf(header);
   return BytesOf(header) + packed;
 }
 
@@ -61,12 +62,16 @@ Result<Block> TakeBlock(std::string_view* bytes) {
   Header header;
   ByteReader reader{bytes->substr(0, kHeaderBytes)};
   ReadFields(&reader, &header);
-  if (!reader.good) return Fail(ErrorCode::kFull, "a block ends early");
-  if (header.magic != kMagic || header.unpacked_bytes > kBlockBytesMax) return damaged;
+  // After a power cut a file may end in zeros, where its length was written and its bytes were not.
+  const bool is_tail = bytes->find_first_not_of('\0') == std::string_view::npos;
+  if (!reader.good || is_tail) return Fail(ErrorCode::kFull, "a block ends early");
+  if (header.magic != kMagic || CrcOf(header) != header.header_crc ||
+      header.unpacked_bytes > kBlockBytesMax)
+    return damaged;
   if (bytes->size() - kHeaderBytes < header.packed_bytes)
     return Fail(ErrorCode::kFull, "a block ends early");
   const std::string_view packed = bytes->substr(kHeaderBytes, header.packed_bytes);
-  if (CrcOf(header, packed) != header.crc) return damaged;
+  if (CrcOf(packed) != header.packed_crc) return damaged;
   Block block{.kind = header.kind,
               .first_step = header.first_step,
               .records = header.records,

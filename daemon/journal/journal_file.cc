@@ -25,9 +25,15 @@ constexpr std::uint32_t kFormat = 1;
 /// A file is at most this share of the folder's limit, so that the limit is kept within so much.
 constexpr std::uint64_t kFilesOfLimit = 16;
 constexpr std::uint64_t kFileBytesLeast = 64 << 10;
+constexpr std::uint64_t kFileBytesMost = 64 << 20;  // a reader has a whole file in memory
+/// The store on the same disk must not run out of room: so much stays free. A night of a store
+/// takes some 50 MB. With half of it one long night might meet the end of the disk; twice as much
+/// would forbid a journal on small test machines.
+constexpr std::uintmax_t kFreeBytesLeast = 256 << 20;
 
 struct Head {
   std::uint32_t format = kFormat;
+  std::string version;
   std::string life;
   std::uint64_t number = 0;
 };
@@ -56,10 +62,13 @@ std::vector<fs::path> FilesOf(const fs::path& folder) {
   return files;
 }
 
-std::string BlockOfHead(const std::string& life, std::uint64_t number) {
-  Block block{.kind = BlockKind::kHead};
-  WriteFields(Head{.life = life, .number = number}, &block.bytes);
-  return Packed(block);
+Status CheckRoom(const std::string& folder) {
+  std::error_code error;
+  const fs::space_info space = fs::space(folder, error);
+  if (error || space.available >= kFreeBytesLeast) return {};
+  return Fail(ErrorCode::kFull,
+              fmt::format("{}: less than {} MiB are free, which are kept for the store", folder,
+                          kFreeBytesLeast >> 20));
 }
 
 /// The head of a file, taken off. Errors: as TakeBlock; kInvalid, kNewer.
@@ -73,6 +82,7 @@ Result<Head> TakeHead(std::string_view* bytes) {
   if (head.format != kFormat)
     return Fail(ErrorCode::kNewer, fmt::format("its format is {}; this program reads format {}",
                                                head.format, kFormat));
+  ReadFields(&reader, &head.version);
   ReadFields(&reader, &head.life);
   ReadFields(&reader, &head.number);
   if (!reader.good) return Fail(ErrorCode::kInvalid, "this is no journal");
@@ -83,8 +93,8 @@ Result<Head> TakeHead(std::string_view* bytes) {
 
 // ---- Writing
 
-JournalWriter::JournalWriter(Options options, std::string life)
-    : options_(std::move(options)), life_(std::move(life)) {}
+JournalWriter::JournalWriter(Options options, std::string life, std::string version)
+    : options_(std::move(options)), life_(std::move(life)), version_(std::move(version)) {}
 
 Result<std::unique_ptr<JournalWriter>> JournalWriter::Open(Options options,
                                                            const LifeRecord& life) {
@@ -92,24 +102,38 @@ Result<std::unique_ptr<JournalWriter>> JournalWriter::Open(Options options,
   std::erase_if(name, [](char letter) { return letter == '-' || letter == ':'; });
   if (::mkdir(options.folder.c_str(), 0750) != 0 && errno != EEXIST)
     return FailErrno(options.folder, "cannot be made", errno);
-  std::unique_ptr<JournalWriter> writer(new JournalWriter(std::move(options), std::move(name)));
+  std::unique_ptr<JournalWriter> writer(
+      new JournalWriter(std::move(options), std::move(name), life.version));
   FOCALFLEET_TRY(writer->OpenNext());
-  FOCALFLEET_TRY(
-      writer->Append(Packed({.kind = BlockKind::kLife, .records = 1, .bytes = BytesOf(life)})));
+  Status begun =
+      writer->Append(Packed({.kind = BlockKind::kLife, .records = 1, .bytes = BytesOf(life)}));
+  if (!begun) {
+    ::unlink(writer->path_.c_str());  // it is opened anew under this name
+    return tl::unexpected<Error>(std::move(begun).error());
+  }
   return writer;
 }
 
+/// Afterwards the next file is open and has its head, or the one before is still open.
 Status JournalWriter::OpenNext() {
   const std::uint64_t number = number_ + 1;
   const std::string path = (fs::path(options_.folder) / NameOf(life_, number)).string();
+  FOCALFLEET_TRY(CheckRoom(options_.folder));
   Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
   if (file.get() < 0) return FailErrno(path, "cannot be created", errno);
+  Block block{.kind = BlockKind::kHead};
+  WriteFields(Head{.version = version_, .life = life_, .number = number}, &block.bytes);
+  const std::string head = Packed(block);
+  if (const int error = WriteAll(file.get(), head); error != 0) {
+    ::unlink(path.c_str());
+    return FailErrno(path, "cannot be written", error);
+  }
   file_ = std::move(file);
   path_ = path;
   number_ = number;
-  bytes_ = 0;
+  bytes_ = head.size();
   RemoveOldest();
-  return Append(BlockOfHead(life_, number_));
+  return {};
 }
 
 Status JournalWriter::Append(std::string_view block) {
@@ -126,8 +150,11 @@ Status JournalWriter::Append(std::string_view block) {
 }
 
 Status JournalWriter::Write(std::span<const NumberedRecord> records) {
-  constexpr std::size_t kBlockBytes = 1 << 20;  // unpacked, but for a record that is larger
-  const std::uint64_t file_bytes = std::max(kFileBytesLeast, options_.limit_bytes / kFilesOfLimit);
+  FOCALFLEET_TRY(CheckRoom(options_.folder));
+  const std::uint64_t file_bytes =
+      std::clamp(options_.limit_bytes / kFilesOfLimit, kFileBytesLeast, kFileBytesMost);
+  // Unpacked, but for a record that is larger.
+  const std::uint64_t block_bytes = std::min<std::uint64_t>(1 << 20, file_bytes);
   for (std::size_t n = 0; n < records.size();) {
     Block block{.kind = BlockKind::kSteps, .first_step = records[n].step};
     do {
@@ -135,7 +162,7 @@ Status JournalWriter::Write(std::span<const NumberedRecord> records) {
       ++block.records;
       ++n;
     } while (n < records.size() && records[n].step == records[n - 1].step + 1 &&
-             block.bytes.size() < kBlockBytes);
+             block.bytes.size() < block_bytes);
     if (file_.get() < 0 || bytes_ > file_bytes) FOCALFLEET_TRY(OpenNext());
     FOCALFLEET_TRY(Append(Packed(block)));
   }
@@ -147,8 +174,10 @@ Status JournalWriter::End() {
   return Append(Packed({.kind = BlockKind::kEnd}));
 }
 
-void JournalWriter::RemoveOldest() const {
+void JournalWriter::RemoveOldest() {
   std::vector<fs::path> files = FilesOf(options_.folder);
+  std::ranges::stable_partition(
+      files, [this](const fs::path& file) { return LifeOfName(file.filename()) != life_; });
   std::uint64_t sum = 0;
   std::error_code error;
   const auto bytes = [&error](const fs::path& file) {
@@ -156,11 +185,13 @@ void JournalWriter::RemoveOldest() const {
     return error ? 0 : static_cast<std::uint64_t>(size);
   };
   for (const fs::path& file : files) sum += bytes(file);
+  const std::uint64_t room =
+      std::max(kFileBytesLeast, std::min(options_.limit_bytes / kFilesOfLimit, kFileBytesMost));
   for (const fs::path& file : files) {
-    // The file that was just opened is the newest one, and empty.
-    if (sum <= options_.limit_bytes - options_.limit_bytes / kFilesOfLimit || file == path_) return;
+    if (sum + room <= options_.limit_bytes || file == path_) return;
     sum -= bytes(file);
     fs::remove(file, error);
+    if (LifeOfName(file.filename()) == life_) whole_ = false;
   }
 }
 
@@ -238,6 +269,7 @@ Result<bool> JournalReader::NextBlock() {
                                     "cannot be replayed from its middle",
                                     files_.front())
                       : fmt::format("{}: the file before it is missing", files_[next_file_ - 1]));
+    version_ = head->version;
     place_ = file_.size() - left.size();
   }
   auto block = TakeBlock(&left);
@@ -253,7 +285,9 @@ Result<bool> JournalReader::NextBlock() {
   switch (block->kind) {
     case BlockKind::kLife: {
       auto life = LifeFrom(block->bytes);
-      if (!life) return named(life.error());
+      if (!life)
+        return named({life.error().code,
+                      fmt::format("{}; version {} wrote it", life.error().text, version_)});
       life_ = std::move(*life);
       return true;
     }

@@ -4,10 +4,13 @@
 //
 //   file   = block of kind kHead, then further blocks
 //   block  = header, packed bytes
-//   header = "FFJB", kind, first step, records, unpacked bytes, packed bytes, CRC-32 of all of it
+//   header = "FFJB", kind, first step, records, unpacked bytes, packed bytes, CRC-32 of these and
+//   of
+//            the header
 //
 // A name is the life's begin and the file's number, so that names sort by age. The oldest files go
-// when the folder is over its limit. A life that has lost its first file can no longer be replayed.
+// when the folder is over its limit, those of the present life last, because a life that has lost
+// its first file can no longer be replayed.
 // A process that is killed leaves a last block that ends early; the blocks before it are whole.
 #pragma once
 
@@ -50,12 +53,14 @@ class JournalWriter {
   Status Write(std::span<const NumberedRecord> records);
   /// The life has ended with all its steps written.
   Status End();
+  /// All of this life's files are there.
+  [[nodiscard]] bool whole() const { return whole_; }
 
  private:
-  JournalWriter(Options options, std::string life);
+  JournalWriter(Options options, std::string life, std::string version);
   Status OpenNext();
   Status Append(std::string_view block);
-  void RemoveOldest() const;
+  void RemoveOldest();
 
   Options options_;
   std::string life_;  // the first part of its files' names
@@ -63,6 +68,8 @@ class JournalWriter {
   Descriptor file_;
   std::string path_;
   std::uint64_t bytes_ = 0;  // of the file, whole blocks
+  bool whole_ = true;
+  std::string version_;
 };
 
 /// Reads one life from its first step to its last.
@@ -74,6 +81,8 @@ class JournalReader {
   static Result<JournalReader> Open(const std::string& path);
 
   [[nodiscard]] const LifeRecord& life() const { return life_; }
+  /// Version of the program that wrote the newest file read so far; empty: none could be read.
+  [[nodiscard]] const std::string& version() const { return version_; }
   /// The next record, in the order of steps; none: the journal ends here, see `end`. The text stays
   /// valid until the next call. Errors: kInvalid: steps are missing, or a block in the middle is
   /// damaged; the text says which.
@@ -98,6 +107,7 @@ class JournalReader {
   std::size_t at_ = 0;      // in it
   std::uint64_t step_ = 0;  // of the last record
   std::uint64_t bytes_ = 0;
+  std::string version_;
   LifeRecord life_;
   End end_ = End::kCutOff;
 };

@@ -17,6 +17,8 @@ constexpr std::size_t kWaitingMax = 1 << 16;
 constexpr std::size_t kWaitingBytesMax = 64 << 20;
 /// The thread is woken early at so much.
 constexpr std::size_t kWakeBytes = 4 << 20;
+constexpr const char* kRestart =
+    "it can be replayed no more; a restart of the daemon begins a new one";
 
 }  // namespace
 
@@ -83,11 +85,15 @@ void JournalThread::WriteWaiting() {
 
 Status JournalThread::Write(const std::vector<NumberedRecord>& records) {
   FOCALFLEET_TRY(writer_->Write(records));
-  const std::uint64_t dropped = dropped_;
-  if (dropped == dropped_noted_) return {};
-  dropped_noted_ = dropped;
-  return Fail(ErrorCode::kFull, options_.files.folder + ": the disk does not keep up, " +
-                                    std::to_string(dropped) + " steps are missing");
+  if (dropped_ > 0)
+    return Fail(
+        ErrorCode::kFull,
+        options_.files.folder + ": the disk did not keep up, and steps are missing: " + kRestart);
+  if (!writer_->whole())
+    return Fail(ErrorCode::kFull,
+                options_.files.folder +
+                    ": this life is longer than [journal] limit_MiB holds: " + kRestart);
+  return {};
 }
 
 void JournalThread::Note(const Status& status) {

@@ -52,7 +52,6 @@ class JournalThread {
   SpscQueue<NumberedRecord> waiting_;
   std::atomic<std::size_t> waiting_bytes_{0};
   std::atomic<std::uint64_t> dropped_{0};  // steps that found no room
-  std::uint64_t dropped_noted_ = 0;
   std::atomic<bool> ending_{false};
   std::thread thread_;  // last: it uses all members above
 };

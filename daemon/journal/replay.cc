@@ -1,16 +1,17 @@
 #include "daemon/journal/replay.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "daemon/journal/step_record.h"
 
 namespace focalfleet::journal {
+namespace {
 
-Result<ReplayReport> ReplayJournal(const std::string& path,
-                                   const std::function<void(std::uint64_t)>& progress) {
+Result<ReplayReport> Replay(const std::string& path, JournalReader* reader,
+                            const std::function<void(std::uint64_t)>& progress) {
   constexpr std::uint64_t kProgressEvery = 10'000;
-  FOCALFLEET_TRY_ASSIGN(JournalReader reader, JournalReader::Open(path));
-  const LifeRecord& life = reader.life();
+  const LifeRecord& life = reader->life();
   auto layout =
       Layout::Create(life.units, {.clearance_mm = life.clearance_mm, .obstacles = life.obstacles});
   if (!layout)
@@ -19,7 +20,7 @@ Result<ReplayReport> ReplayJournal(const std::string& path,
   Replayer replayer({&*layout, life.drives, life.config, life.stored});
   HostInstant first = kNever;
   for (;;) {
-    FOCALFLEET_TRY_ASSIGN(const auto record, reader.Next());
+    FOCALFLEET_TRY_ASSIGN(const auto record, reader->Next());
     if (!record) break;
     FOCALFLEET_TRY(replayer.Step(*record));
     first = std::min(first, replayer.now());
@@ -27,8 +28,20 @@ Result<ReplayReport> ReplayJournal(const std::string& path,
     if (replayer.steps() % kProgressEvery == 0) progress(replayer.steps());
   }
   report.steps = replayer.steps();
-  report.bytes = reader.bytes();
-  report.end = reader.end();
+  report.bytes = reader->bytes();
+  report.end = reader->end();
+  return report;
+}
+
+}  // namespace
+
+Result<ReplayReport> ReplayJournal(const std::string& path, const std::string& own_version,
+                                   const std::function<void(std::uint64_t)>& progress) {
+  FOCALFLEET_TRY_ASSIGN(JournalReader reader, JournalReader::Open(path));
+  auto report = Replay(path, &reader, progress);
+  if (!report && reader.version() != own_version)
+    return Fail(report.error().code, report.error().text + "; version " + reader.version() +
+                                         " wrote the journal, and this program is " + own_version);
   return report;
 }
 

@@ -23,8 +23,9 @@ struct ReplayReport {
 };
 
 /// `progress` gets the number of steps now and then. Errors: as JournalReader; kRefused: a step
-/// decides otherwise; the text has its number, its instant and what differs.
-Result<ReplayReport> ReplayJournal(const std::string& path,
+/// decides otherwise; the text has its number, its instant and what differs, and both versions
+/// where `own_version` is another than the journal's.
+Result<ReplayReport> ReplayJournal(const std::string& path, const std::string& own_version,
                                    const std::function<void(std::uint64_t)>& progress);
 
 }  // namespace focalfleet::journal

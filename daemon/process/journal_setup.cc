@@ -54,7 +54,8 @@ Result<std::unique_ptr<journal::JournalThread>> OpenJournal(const DaemonConfig& 
 
 int ReplayAndPrint(const std::string& path) {
   const bool shown = ::isatty(STDERR_FILENO) != 0;
-  const auto report = journal::ReplayJournal(path, [shown](std::uint64_t steps) {
+  const std::string own = BuildVersion();
+  const auto report = journal::ReplayJournal(path, own, [shown](std::uint64_t steps) {
     if (shown) std::fprintf(stderr, "\r%llu steps", static_cast<unsigned long long>(steps));
   });
   if (shown) std::fputs("\r", stderr);
@@ -62,7 +63,6 @@ int ReplayAndPrint(const std::string& path) {
     std::fprintf(stderr, "focalfleetd: %s\n", PrintableLines(report.error().text).c_str());
     return 1;
   }
-  const std::string own = BuildVersion();
   std::fputs(fmt::format("life        {}, {} units, {:.1f} s, {:.1f} MB of journal\n"
                          "version     {}{}\n"
                          "steps       {}, all decided as recorded, in {:.1f} s of CPU\n"

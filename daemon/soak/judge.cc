@@ -302,8 +302,9 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
   const auto since = std::ranges::count_if(
       cuts, [&](HostInstant cut) { return known == stored_.end() || cut > known->second.last; });
   double slack = slack_vectors_;
-  if (!cuts.empty() || intent != shadow_.intents.end())
-    slack = std::max(slack, kJumpVectors * static_cast<double>(std::max<std::ptrdiff_t>(since, 1)));
+  const bool open = intent != shadow_.intents.end();
+  slack =
+      std::max(slack, kJumpVectors * static_cast<double>(std::max<std::ptrdiff_t>(since, open)));
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     double low = -1e18, high = 1e18;
     if (intent != shadow_.intents.end()) {

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
 #include <string>
+#include <utility>
 
 #include "fleet/camera/claims.h"
 #include "fleet/kinematics.h"
@@ -80,17 +84,46 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
   return all;
 }
 
+namespace {
+
+/// An error of the spot turns theta, and with it the elbow: without bound where the arm is folded,
+/// by its root where the arm is stretched. Four standard deviations: one lost unit of 16,000 is
+/// taken for known too early. With two it would be one of 20; with eight, twice as large a circle
+/// around the base has to be homed.
+bool IsElbowKnown(const Unit& unit, PointFp at_fp, double sigma_mm, double clearance_mm) {
+  using namespace std::complex_literals;
+  constexpr double kSigmas = 4;
+  const auto elbow_at = [&unit](const AxisAngles& angles) {
+    return std::polar(unit.theta().arm_mm,
+                      (angles.theta_deg + unit.theta().zero_deg) * std::numbers::pi / 180);
+  };
+  const std::complex<double> fibre{at_fp.x_mm, at_fp.y_mm};
+  const std::complex<double> from_base = fibre - std::complex(unit.base_fp.x_mm, unit.base_fp.y_mm);
+  const double distance_mm = std::abs(from_base);
+  const std::complex<double> along = distance_mm > 0 ? from_base / distance_mm : 1.0;
+  const std::vector<AxisAngles> here = AnglesFor(unit, at_fp);
+  for (const std::complex<double> turn : {1.0 + 0i, -1.0 + 0i, 0.0 + 1i, 0.0 - 1i}) {
+    const std::complex<double> there = fibre + kSigmas * sigma_mm * along * turn;
+    const auto there_fp = InReach(unit, {there.real(), there.imag()}, kStraySlackMm);
+    if (!there_fp) return false;
+    for (const AxisAngles& angles : here) {
+      double apart_mm = std::numeric_limits<double>::infinity();
+      for (const AxisAngles& other : AnglesFor(unit, *there_fp))
+        apart_mm = std::min(apart_mm, std::abs(elbow_at(angles) - elbow_at(other)));
+      if (apart_mm > clearance_mm) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
 std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
                                const UnitExpectation& expectation, double sigma_mm,
                                double clearance_mm) {
   const auto at_fp = InReach(unit, seen_fp, kStraySlackMm);
   if (!at_fp) return std::nullopt;
-  // An error across the line from base to fibre turns theta, and with it the elbow. Four standard
-  // deviations: one lost unit of 16,000 is taken for known too early. With two it would be one of
-  // 20; with eight, twice as large a circle around the base has to be homed.
-  const double from_base_mm =
-      std::hypot(at_fp->x_mm - unit.base_fp.x_mm, at_fp->y_mm - unit.base_fp.y_mm);
-  if (4 * sigma_mm * unit.theta().arm_mm > clearance_mm * from_base_mm) return std::nullopt;
+  if (!IsElbowKnown(unit, *at_fp, sigma_mm, clearance_mm)) return std::nullopt;
   std::vector<AxisAngles> possible = AnglesFor(unit, *at_fp);
   if (expectation.within)
     std::erase_if(possible,

@@ -35,8 +35,8 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
 
 /// The pose, in vectors, of a unit of unknown place that is seen at `seen_fp`. Empty: its arms do
 /// not reach there, or more than one whole turn or elbow side is possible and neither its interval
-/// nor its own report decides, or the fibre is so near its base that the elbow may be off by
-/// `clearance_mm` at four standard deviations: a folded arm points anywhere.
+/// nor its own report decides, or four standard deviations of the spot may move the elbow by more
+/// than `clearance_mm`, as where the arm is folded or stretched.
 std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
                                const UnitExpectation& expectation, double sigma_mm,
                                double clearance_mm);

@@ -89,6 +89,7 @@ bool Homing::Commit() {
   if (wave_.empty()) return false;
   // A new id: the moves that made way for these units had their own.
   round_.move = fleet_.ledger.TakeMoveId();
+  fleet_.ledger.homing_configurations.insert(configuration_.view.id);
   for (const PositionerIndex i : wave_) {
     // The unit begins to count anew at its stop, so the offset of its old count is over.
     Intend(fleet_, HomingIntentOf(fleet_, configuration_.view.id, round_.move, i), {}, i, &round_);
@@ -122,7 +123,6 @@ void Homing::Start() {
     }
     round_.SetPart(i, Part::kMoving);
     fleet_.units.SetPhase(i, kHoming);
-    round_[i].before.reset();
     fleet_.units[i].next_poll = fleet_.now() + fleet_.config.poll_period;
     fleet_.requests.Ask(i, Home{round_.move});
   }
@@ -131,7 +131,11 @@ void Homing::Start() {
 bool Homing::Refuses(PositionerIndex i, const HomeReply& reply) {
   if (fleet_.units[i].view.phase != kHoming || reply.move != round_.move) return false;
   fleet_.timers.Set(i, fleet_.units[i].next_poll);
-  if (reply.answer == Answer::kOk || reply.answer == Answer::kBegunBefore) return false;
+  if (reply.answer == Answer::kOk || reply.answer == Answer::kBegunBefore) {
+    round_[i].before.reset();
+    return false;
+  }
+  TakeBackIntent(fleet_, i, &round_);  // with the offset of its old count
   configuration_.outcomes.Set(i, TargetOutcome::kFailed,
                               std::string("refuses to home: ") + Name(reply.answer));
   round_.SetPart(i, Part::kNone);

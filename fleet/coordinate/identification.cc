@@ -127,16 +127,22 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
   UnitView& view = record.view;
   const Reading& reading = record.reading;
   // The unit tells of a restart once. A run that ended before it had stored what follows from it
-  // leaves nothing but the open intent.
+  // leaves nothing but the open intent. A move that ends where it began is believed even so: it is
+  // over, unless both the mark and that run were lost.
   StatusReply status = reading.status;
   status.restarted = std::exchange(record.restarted, false) ||
-                     (store.intent && !fleet.ledger.IsOfThisRun(*store.intent));
+                     (store.intent && !fleet.ledger.IsOfThisRun(*store.intent) &&
+                      store.intent->from != store.intent->to);
   const Reconciled result =
       Reconcile({status, fleet.units.PlaceAt(i, reading.position), reading.subdivision}, store);
-  if (result.intent_end) fleet.ledger.EndIntent(fleet.units[i].view.serial, *result.intent_end);
-  // The `done` was lost, but the unit stands short of its end, and nothing but a stop leaves it
-  // there.
-  if (result.intent_end == IntentEnd::kStopped && record.motion.runs_freely)
+  const bool fault = reading.status.state == UnitState::kFault;
+  if (result.intent_end)
+    fleet.ledger.EndIntent(
+        fleet.units[i].view.serial,
+        result.intent_end == IntentEnd::kStopped && fault ? IntentEnd::kFault : *result.intent_end);
+  // The `done` was lost, but the unit stands short of its end without a fault, and nothing but a
+  // stop leaves it there.
+  if (result.intent_end == IntentEnd::kStopped && !fault && record.motion.runs_freely)
     fleet.units.Report(i, UnitEventKind::kForeignStop);
   record.motion.runs_freely = false;
   if (!store.vector || store.vector->knowledge != result.knowledge)
@@ -182,7 +188,11 @@ void Concluded(const Coordination& fleet, PositionerIndex i) {
   }
   if (const auto it = fleet.ledger.intents.find(view.serial); it != fleet.ledger.intents.end()) {
     store.intent = it->second;
-    store.homes = it->second.to == HomeCountOf(fleet, i);
+    // An earlier run's intent does not say whether it homes.
+    store.homes = fleet.ledger.IsOfThisRun(it->second)
+                      ? fleet.ledger.homing_configurations.contains(it->second.configuration) &&
+                            it->second.to == HomeCountOf(fleet, i)
+                      : it->second.to == HomeCountOf(fleet, i);
     if (reading.status.state == UnitState::kMoving || reading.status.state == UnitState::kHoming) {
       view.knowledge = it->second.hull;
       fleet.units.SetPhase(i, kSettling);

@@ -35,7 +35,7 @@ IntentRow IntentOf(const Coordination& fleet, const Round& round, std::uint64_t 
 void Intend(const Coordination& fleet, const IntentRow& intent, const Pose& offset,
             PositionerIndex i, Round* round) {
   UnitView& view = fleet.units[i].view;
-  (*round)[i].before = {view.knowledge, view.offset};
+  (*round)[i].before = {view.knowledge, view.offset, intent.move};
   view.offset = offset;
   fleet.ledger.intents[intent.serial] = intent;
   fleet.ledger.Note(intent);
@@ -46,9 +46,12 @@ void Intend(const Coordination& fleet, const IntentRow& intent, const Pose& offs
 void TakeBackIntent(const Coordination& fleet, PositionerIndex i, Round* round) {
   std::optional<RoundUnit::Before>& before = (*round)[i].before;
   if (!before) return;
-  // A unit that was lost meanwhile keeps its intent: its return decides.
+  // A unit that was lost meanwhile keeps its intent: its return decides, or has decided.
   UnitView& view = fleet.units[i].view;
-  if (view.phase == UnitPhase::kArmed || view.phase == UnitPhase::kReady) {
+  const auto intent = fleet.ledger.intents.find(view.serial);
+  const bool open = intent != fleet.ledger.intents.end() && intent->second.move == before->move;
+  if (open && (view.phase == UnitPhase::kArmed || view.phase == UnitPhase::kReady ||
+               view.phase == UnitPhase::kHoming)) {
     fleet.ledger.EndIntent(view.serial, IntentEnd::kNeverBegan);
     view.offset = before->offset;
     Know(fleet, i, before->knowledge, Origin::kMove);

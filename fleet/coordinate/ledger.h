@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -67,6 +68,7 @@ class Ledger {
   std::unordered_map<SerialNumber, VectorRow> vectors;   // as stored
   std::unordered_map<SerialNumber, IntentRow> intents;   // open ones
   std::vector<ConfigurationRow> earlier_configurations;  // as stored
+  std::set<std::uint64_t> homing_configurations;         // of this run, those that homed units
 
  private:
   struct KeptReply {

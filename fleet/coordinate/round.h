@@ -29,6 +29,7 @@ struct RoundUnit {
   struct Before {
     UnitKnowledge knowledge;
     Pose offset{};
+    MoveId move;  // of the intent
   };
 
   std::size_t plan = kNoPlan;  // index of its move in Round::plan

@@ -143,7 +143,7 @@ TEST_F(JournalFile, AByteThatChangedIsNeverTakenForARecord) {
     damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
     std::ofstream(path, std::ios::binary | std::ios::trunc) << damaged;
     const ReadBack read = ReadAllOf(path);
-    EXPECT_TRUE(!read.error.empty() || read.end == JournalReader::End::kLastTorn) << at;
+    EXPECT_FALSE(read.error.empty()) << at << ": damage is no killed daemon";
     for (std::size_t n = 0; n < read.records.size(); ++n)
       ASSERT_EQ(read.records[n], Records(n + 1, n + 1)[0].bytes) << at;
   }
@@ -171,6 +171,7 @@ TEST_F(JournalFile, StaysWithinItsLimitAndTheOldestGo) {
     for (const std::string& file : Files()) sum += std::filesystem::file_size(file);
     most = std::max(most, sum);
   }
+  EXPECT_FALSE(writer->whole()) << "it says that it can be replayed no more";
   EXPECT_LE(most, kLimit);
   EXPECT_GT(most, kLimit / 2);
   const ReadBack read = ReadAllOf(folder_);
@@ -206,6 +207,47 @@ TEST_F(JournalFile, AfterAFullDiskItGoesOnBehindTheLastWholeBlock) {
   const ReadBack read = ReadAllOf(folder_);
   EXPECT_EQ(read.records.size(), 10u);
   EXPECT_THAT(read.error, HasSubstr("steps 11 to 20 are not in the journal"));
+}
+
+TEST_F(JournalFile, ZerosAtTheEndAreAPowerCut) {
+  auto writer = Writer();
+  ASSERT_TRUE(writer->Write(Records(1, 3)));
+  std::ofstream(Files().front(), std::ios::binary | std::ios::app) << std::string(5000, '\0');
+  const ReadBack read = ReadAllOf(folder_);
+  EXPECT_EQ(read.records.size(), 3u) << read.error;
+  EXPECT_EQ(read.end, JournalReader::End::kLastTorn);
+}
+
+TEST_F(JournalFile, ADiskThatIsFullAtTheBeginningIsTriedAgain) {
+  ::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  for (const rlim_t bytes : {10u, 150u}) {  // in the head, in the life
+    rlimit tight = before;
+    tight.rlim_cur = bytes;
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &tight), 0);
+    const auto refused =
+        JournalWriter::Open({.folder = folder_, .limit_bytes = 1 << 30}, SomeLife());
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+    EXPECT_FALSE(refused);
+    EXPECT_TRUE(Files().empty());
+  }
+  ASSERT_TRUE(Writer()->Write(Records(1, 3)));
+  EXPECT_EQ(ReadAllOf(folder_).records.size(), 3u);
+}
+
+TEST_F(JournalFile, OtherLivesGoBeforeThePresentOneWhateverTheirTimes) {
+  constexpr std::uint64_t kLimit = 2 << 20;
+  ASSERT_TRUE(Writer(kLimit, SomeLife(2'100'000'000))->Write(Records(1, 400, 2000)));  // 2036
+  auto writer = Writer(kLimit, SomeLife(1'700'000'000));
+  ASSERT_TRUE(writer->Write(Records(1, 700, 2000)));
+  EXPECT_TRUE(writer->whole());
+  const std::vector<std::string> files = Files();
+  EXPECT_THAT(files.front(), HasSubstr("20231114T221320.000Z.000001"));
+  EXPECT_THAT(files.back(), ::testing::Not(HasSubstr("20360718T132000.000Z.000001")));
+  std::uint64_t sum = 0;
+  for (const std::string& file : files) sum += std::filesystem::file_size(file);
+  EXPECT_LE(sum, kLimit);
 }
 
 TEST_F(JournalFile, WhatIsNoJournalIsRefused) {

@@ -56,7 +56,7 @@ TEST(Replay, FindsEachStepDecidedTheSame) {
   Silence silence;
   for (int step = 0; step < 20; ++step) silence.Step();
   silence.Write(scratch / "j");
-  const auto report = ReplayJournal(scratch / "j", [](std::uint64_t) {});
+  const auto report = ReplayJournal(scratch / "j", "1", [](std::uint64_t) {});
   ASSERT_TRUE(report) << report.error().text;
   EXPECT_EQ(report->steps, 20u);
   EXPECT_EQ(report->units, 7u);
@@ -77,10 +77,11 @@ TEST(Replay, NamesTheStepThatDecidesOtherwiseAndWhatDiffers) {
     for (int step = 0; step < 5; ++step) silence.Step();
     silence.Step(alter);
     silence.Write(scratch / "j");
-    const auto report = ReplayJournal(scratch / "j", [](std::uint64_t) {});
+    const auto report = ReplayJournal(scratch / "j", "1", [](std::uint64_t) {});
     ASSERT_FALSE(report) << what;
     EXPECT_EQ(report.error().code, ErrorCode::kRefused);
     EXPECT_THAT(report.error().text, HasSubstr("step 6 at 3.000000 s decides " + what));
+    EXPECT_THAT(report.error().text, HasSubstr("this program is 1"));
   }
 }
 

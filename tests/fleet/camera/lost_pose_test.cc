@@ -44,5 +44,22 @@ TEST_F(LostPose, OfAFoldedArmIsNotKnownForItPointsAnywhere) {
   EXPECT_FALSE(Found(40, 180));
 }
 
+// With short arms and little clearance the elbow of a stretched arm is not known well enough.
+TEST(LostPoseOfASmallUnit, WithItsArmStretchedIsNotKnown) {
+  const Layout layout = *Layout::Create(MakeHexLayout({.count = 7, .pitch_mm = 6.2}), {});
+  const Unit& unit = layout.units()[0];
+  const UnitDrive drive{};
+  const auto found = [&](double phi_deg) {
+    const Pose truth{NearestVectors(40, unit.axis[0], drive.axis[0]),
+                     NearestVectors(phi_deg, unit.axis[1], drive.axis[1])};
+    UnitExpectation expectation;
+    expectation.commanded = AnglesOf(unit, drive, truth);
+    return PoseOfLost(unit, drive, FibreAt(unit, drive, truth), expectation, kSigmaMm,
+                      layout.clearance_mm());
+  };
+  EXPECT_TRUE(found(60));
+  EXPECT_FALSE(found(0.5));
+}
+
 }  // namespace
 }  // namespace focalfleet
