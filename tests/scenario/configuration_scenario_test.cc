@@ -181,6 +181,20 @@ TEST(Configuration, FaultInMotionStopsWhoDependsOnItAndTheOthersArriveLater) {
   ExpectOthersArrive(&fleet, 4);
 }
 
+// The unit's own report is lost. It stands short of its end, and no other host has stopped it.
+TEST(Configuration, AFaultThatIsFoundByAskingIsNoStopOfSomebodyElse) {
+  InProcessFleet fleet(Small(15));
+  sim::UnitFaults* faults = fleet.world().disturb().faults(fleet.id(3));
+  faults->in_motion = sim::UnitFaults::InMotion{.after = Seconds(2)};
+  faults->mute_done = true;
+  fleet.ApplyRandom(15);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kFault);
+  EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kDone);
+  EXPECT_FALSE(HasAlarm(fleet, "by somebody else"));
+  ExpectOthersArrive(&fleet, 4);
+}
+
 TEST(Configuration, LostDoneReportsAreAskedFor) {
   InProcessFleet fleet(Small(16));
   for (const std::uint32_t n : {1u, 8u, 20u})
