@@ -181,7 +181,7 @@ TEST(Configuration, FaultInMotionStopsWhoDependsOnItAndTheOthersArriveLater) {
   ExpectOthersArrive(&fleet, 4);
 }
 
-// The unit's own report is lost. It stands short of its end, and no other host has stopped it.
+// The unit's own report is lost, and it stands short of its end. No other host has stopped it.
 TEST(Configuration, AFaultThatIsFoundByAskingIsNoStopOfSomebodyElse) {
   InProcessFleet fleet(Small(15));
   sim::UnitFaults* faults = fleet.world().disturb().faults(fleet.id(3));
