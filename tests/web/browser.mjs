@@ -67,6 +67,13 @@ export async function textOf(tab, selector, pattern) {
   return found.innerText();
 }
 
+/** Units have begun to move: their start comes 0.25 s of the fleet's time after the signal. */
+export async function untilTheyMove(tab) {
+  await textOf(tab, "#fleet-summary", /moving/);
+  await tab.waitForFunction(() => window.focalfleetPage.plate.turning.size > 20);
+  await tab.waitForTimeout(300);
+}
+
 /** The file is dropped onto the page, as from a folder. */
 export async function dropFile(tab, name, text) {
   const data = await tab.evaluateHandle(([fileName, content]) => {

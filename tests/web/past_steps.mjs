@@ -2,7 +2,7 @@
 
 import {readFileSync} from "node:fs";
 import {assert, axeFindings, coloursOf, dropFile, given, isLive, openTab, signIn, textOf,
-  world} from "./browser.mjs";
+  untilTheyMove, world} from "./browser.mjs";
 
 const targets = () => readFileSync(given.targets, "utf8");
 const say = (text) => process.stdout.write(`${text}\n`);
@@ -65,9 +65,7 @@ export async function past(browser) {
   say("a second one is stopped on its way");
   await world("targets 7");
   await apply(tab, "night-2.csv");
-  await textOf(tab, "#fleet-summary", /moving/);
-  await tab.waitForFunction(() => window.focalfleetPage.plate.turning.size > 20);
-  await tab.waitForTimeout(300);  // the signal comes 0.25 s of the fleet's time before the start
+  await untilTheyMove(tab);
   await tab.click("#stop");
   await textOf(tab, "#configuration", /night-2.csv \(configuration 2\) is stopped/);
   await textOf(tab, "#fleet-summary", `${given.count} ready`);  // all have said where they stand

@@ -5,7 +5,8 @@
 // The page's own time is added as measured here.
 
 import {readFileSync} from "node:fs";
-import {assert, dropFile, given, isLive, openTab, signIn, textOf, world} from "./browser.mjs";
+import {assert, dropFile, given, isLive, openTab, signIn, textOf, untilTheyMove, world} from
+  "./browser.mjs";
 
 const targets = () => readFileSync(given.targets, "utf8");
 const say = (text) => process.stdout.write(`${text}\n`);
@@ -141,7 +142,7 @@ export async function tasks(browser) {
   await world("targets 9");
   await dropFile(tab, "tuesday-2.csv", targets());
   await tab.click("#apply");
-  await tab.waitForFunction(() => window.focalfleetPage.plate.turning.size > 20);
+  await untilTheyMove(tab);
   await task(hand, "Stop", async () => {
     await hand.click("#stop");
     await hand.answer("#stop-state", "the daemon has it");
