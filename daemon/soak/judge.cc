@@ -28,6 +28,8 @@ constexpr DurationNs kStopWithin = Milliseconds(150);
 /// A fault that kept a stop from a unit may lead to contact so long after it.
 constexpr DurationNs kContactAfter = Seconds(60);
 constexpr std::size_t kReportedMax = 64;
+/// A row may be so much older than its commit, where the disk fails.
+constexpr DurationNs kRowHeld = Seconds(30);
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
 double Cross(Point a, Point b) { return a.real() * b.imag() - a.imag() * b.real(); }
@@ -299,8 +301,9 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
   const auto place = shadow_.places.find(serial);
   const auto intent = shadow_.intents.find(serial);
   const std::vector<HostInstant>& cuts = troubles_->jumps[row];
-  const auto since = std::ranges::count_if(
-      cuts, [&](HostInstant cut) { return known == stored_.end() || cut > known->second.last; });
+  const auto since = std::ranges::count_if(cuts, [&](HostInstant cut) {
+    return known == stored_.end() || cut > known->second.last - kRowHeld;
+  });
   double slack = slack_vectors_;
   const bool open = intent != shadow_.intents.end();
   slack =
