@@ -14,7 +14,9 @@ namespace focalfleet::soak {
 namespace {
 
 constexpr const char* kStorePath = "store.sqlite";
-constexpr int kPlanLooksMax = 100;
+/// Looks of a search after which it counts as one without end. A plan takes one to two looks a
+/// unit.
+int PlanLooksMax(std::size_t units) { return units <= 100 ? 100 : static_cast<int>(units) * 4; }
 
 StoreOptions OptionsOf(const MemoryDisk& disk) {
   return {.busy_wait = std::chrono::milliseconds(0), .vfs = disk.name(), .vfs_has_files = true};
@@ -108,8 +110,9 @@ void Life::MakeQueues() {
                   return PlanFailed(work.job, {ErrorCode::kUnavailable, "the planner failed"});
                 // A search that finds no end is given up after so many looks, not after a time.
                 int looks = 0;
+                const int most = PlanLooksMax(layout->size());
                 return RunPlanJob(work.job, *layout, work.drives,
-                                  [&looks] { return ++looks > kPlanLooksMax; });
+                                  [&looks, most] { return ++looks > most; });
               },
           .takes = around_.plan_takes,
           .has_room = around_.planner_has_room});
