@@ -11,7 +11,8 @@ namespace focalfleet::journal {
 
 enum class BlockKind : std::uint32_t { kHead = 1, kLife, kSteps, kEnd };
 
-/// No block is larger. A life of 20,000 units takes some 30 MB.
+/// No block is larger. The life of 5000 units takes 0.7 MB, so that a file's length that is damaged
+/// asks for no more memory than this. Units: bytes.
 inline constexpr std::uint32_t kBlockBytesMax = 1u << 28;
 
 struct Block {

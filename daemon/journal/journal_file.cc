@@ -26,9 +26,9 @@ constexpr std::uint32_t kFormat = 1;
 constexpr std::uint64_t kFilesOfLimit = 16;
 constexpr std::uint64_t kFileBytesLeast = 64 << 10;
 constexpr std::uint64_t kFileBytesMost = 64 << 20;  // a reader has a whole file in memory
-/// The store on the same disk must not run out of room: so much stays free. A night of a store
-/// takes some 50 MB. With half of it one long night might meet the end of the disk; twice as much
-/// would forbid a journal on small test machines.
+/// The store on the same disk must not run out of room: so much stays free. A store of 5000 units
+/// with one configuration takes 1.6 MB. Half of it would do, too, for a night of 50 configurations;
+/// twice as much would forbid a journal on small test machines.
 constexpr std::uintmax_t kFreeBytesLeast = 256 << 20;
 
 struct Head {
@@ -37,6 +37,17 @@ struct Head {
   std::string life;
   std::uint64_t number = 0;
 };
+
+/// A file is closed at this size.
+std::uint64_t FileBytesOf(std::uint64_t limit_bytes) {
+  return std::clamp(limit_bytes / kFilesOfLimit, kFileBytesLeast, kFileBytesMost);
+}
+
+std::string BeginningIsGone(const std::string& file) {
+  return file +
+         ": the beginning of this life is not there any more, and it cannot be replayed from "
+         "its middle";
+}
 
 std::string NameOf(const std::string& life, std::uint64_t number) {
   return fmt::format("{}.{:06}{}", life, number, kJournalEnding);
@@ -151,8 +162,7 @@ Status JournalWriter::Append(std::string_view block) {
 
 Status JournalWriter::Write(std::span<const NumberedRecord> records) {
   FOCALFLEET_TRY(CheckRoom(options_.folder));
-  const std::uint64_t file_bytes =
-      std::clamp(options_.limit_bytes / kFilesOfLimit, kFileBytesLeast, kFileBytesMost);
+  const std::uint64_t file_bytes = FileBytesOf(options_.limit_bytes);
   // Unpacked, but for a record that is larger.
   const std::uint64_t block_bytes = std::min<std::uint64_t>(1 << 20, file_bytes);
   for (std::size_t n = 0; n < records.size();) {
@@ -185,8 +195,7 @@ void JournalWriter::RemoveOldest() {
     return error ? 0 : static_cast<std::uint64_t>(size);
   };
   for (const fs::path& file : files) sum += bytes(file);
-  const std::uint64_t room =
-      std::max(kFileBytesLeast, std::min(options_.limit_bytes / kFilesOfLimit, kFileBytesMost));
+  const std::uint64_t room = FileBytesOf(options_.limit_bytes);
   for (const fs::path& file : files) {
     if (sum + room <= options_.limit_bytes || file == path_) return;
     sum -= bytes(file);
@@ -219,11 +228,7 @@ Result<JournalReader> JournalReader::Open(const std::string& path) {
   const auto found = reader.NextBlock();
   if (!found) return tl::unexpected<Error>(found.error());
   if (!*found || reader.life_.units.empty())
-    return Fail(
-        ErrorCode::kInvalid,
-        fmt::format("{}: the beginning of this life is not there any more, and it cannot be "
-                    "replayed from its middle",
-                    reader.files_.front()));
+    return Fail(ErrorCode::kInvalid, BeginningIsGone(reader.files_.front()));
   return reader;
 }
 
@@ -265,9 +270,7 @@ Result<bool> JournalReader::NextBlock() {
     if (head->number != next_file_)
       return Fail(ErrorCode::kInvalid,
                   next_file_ == 1
-                      ? fmt::format("{}: the beginning of this life is not there any more, and it "
-                                    "cannot be replayed from its middle",
-                                    files_.front())
+                      ? BeginningIsGone(files_.front())
                       : fmt::format("{}: the file before it is missing", files_[next_file_ - 1]));
     version_ = head->version;
     place_ = file_.size() - left.size();

@@ -4,14 +4,13 @@
 //
 //   file   = block of kind kHead, then further blocks
 //   block  = header, packed bytes
-//   header = "FFJB", kind, first step, records, unpacked bytes, packed bytes, CRC-32 of these and
-//   of
-//            the header
+//   header = "FFJB", kind, first step, records, unpacked bytes, packed bytes, CRC-32 of the packed
+//            bytes, CRC-32 of the header
 //
 // A name is the life's begin and the file's number, so that names sort by age. The oldest files go
 // when the folder is over its limit, those of the present life last, because a life that has lost
-// its first file can no longer be replayed.
-// A process that is killed leaves a last block that ends early; the blocks before it are whole.
+// its first file can no longer be replayed. A process that is killed leaves a last block that ends
+// early; the blocks before it are whole.
 #pragma once
 
 #include <cstdint>

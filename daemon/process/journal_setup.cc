@@ -19,7 +19,7 @@ ShellNote NoteOf(const std::string& trouble) {
   if (trouble.empty())
     return {AlarmName::kJournalBack, "the journal is written again", AlarmName::kJournalMissing};
   return {AlarmName::kJournalMissing,
-          "no journal, the fleet works on and it is tried again: " + trouble};
+          "the journal is not whole, and the fleet works on: " + trouble};
 }
 
 const char* Meaning(journal::JournalReader::End end) {

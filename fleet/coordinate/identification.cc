@@ -189,10 +189,9 @@ void Concluded(const Coordination& fleet, PositionerIndex i) {
   if (const auto it = fleet.ledger.intents.find(view.serial); it != fleet.ledger.intents.end()) {
     store.intent = it->second;
     // An earlier run's intent does not say whether it homes.
-    store.homes = fleet.ledger.IsOfThisRun(it->second)
-                      ? fleet.ledger.homing_configurations.contains(it->second.configuration) &&
-                            it->second.to == HomeCountOf(fleet, i)
-                      : it->second.to == HomeCountOf(fleet, i);
+    store.homes = it->second.to == HomeCountOf(fleet, i) &&
+                  (!fleet.ledger.IsOfThisRun(it->second) ||
+                   fleet.ledger.homing_configurations.contains(it->second.configuration));
     if (reading.status.state == UnitState::kMoving || reading.status.state == UnitState::kHoming) {
       view.knowledge = it->second.hull;
       fleet.units.SetPhase(i, kSettling);
