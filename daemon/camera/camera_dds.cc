@@ -2,6 +2,7 @@
 
 #include <dds/dds.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "daemon/dds/cyclone.h"
@@ -42,8 +43,7 @@ class CameraDds::Impl {
   static Result<std::unique_ptr<Impl>> Create(const DdsOptions& dds, SensorLimits sensor) {
     auto impl = std::make_unique<Impl>();
     impl->sensor_ = sensor;
-    FOCALFLEET_TRY_ASSIGN(impl->domain_, Domain::Acquire(dds.domain, dds.config_xml));
-    FOCALFLEET_TRY_ASSIGN(impl->participant_, MakeParticipant(dds.domain, dds.security));
+    FOCALFLEET_TRY_ASSIGN(impl->participant_, Participant::Join(dds));
     FOCALFLEET_TRY_ASSIGN(
         const Handle request,
         MakeTopic(impl->participant_, focalfleet_ExposureRequest_desc, kExposureRequestTopic));
@@ -62,44 +62,94 @@ class CameraDds::Impl {
     return {};
   }
 
-  Result<std::optional<Exposure>> Take() {
-    void* samples[1] = {nullptr};  // null asks Cyclone for a loan
-    dds_sample_info_t info;
-    const dds_return_t count = dds_take(reader_, samples, &info, 1, 1);
-    if (count < 0) return DdsFailure("take an exposure", count);
-    if (count == 0) return std::optional<Exposure>();
-    auto exposure = info.valid_data
-                        ? FromSample(*static_cast<const focalfleet_Exposure*>(samples[0]), sensor_)
-                              .map([](Exposure&& good) { return std::optional(std::move(good)); })
-                        : Result<std::optional<Exposure>>(std::nullopt);
-    const dds_return_t returned = dds_return_loan(reader_, samples, count);
-    if (returned < 0) return DdsFailure("return a loan", returned);
-    return exposure;
+  /// The next exposure that `arrived` does not know yet.
+  Result<std::optional<Exposure>> Take(Arrivals* arrived) {
+    for (;;) {
+      void* samples[1] = {nullptr};  // null asks Cyclone for a loan
+      dds_sample_info_t info;
+      const dds_return_t count = dds_take(reader_, samples, &info, 1, 1);
+      if (count < 0) return DdsFailure("take an exposure", count);
+      if (count == 0) return std::optional<Exposure>();
+      const bool is_new = info.valid_data && arrived->Add(info.source_timestamp);
+      auto exposure =
+          is_new ? FromSample(*static_cast<const focalfleet_Exposure*>(samples[0]), sensor_)
+                       .map([](Exposure&& good) { return std::optional(std::move(good)); })
+                 : Result<std::optional<Exposure>>(std::nullopt);
+      const dds_return_t returned = dds_return_loan(reader_, samples, count);
+      if (returned < 0) return DdsFailure("return a loan", returned);
+      if (is_new) return exposure;
+    }
+  }
+
+  /// A camera reads the requests and writes exposures.
+  [[nodiscard]] bool has_camera() const {
+    dds_publication_matched_status_t asked{};
+    dds_subscription_matched_status_t answering{};
+    return dds_get_publication_matched_status(writer_, &asked) == DDS_RETCODE_OK &&
+           dds_get_subscription_matched_status(reader_, &answering) == DDS_RETCODE_OK &&
+           asked.current_count > 0 && answering.current_count > 0;
   }
 
  private:
   SensorLimits sensor_;
-  Domain domain_;  // outlives the participant
-  Entity participant_;
+  Participant participant_;
   Handle writer_ = 0;
   Handle reader_ = 0;
 };
 
-CameraDds::CameraDds(Options options)
-    : joined_({.join = [dds = std::move(options.dds),
-                        sensor = options.sensor] { return Impl::Create(dds, sensor); },
-               .tell = std::move(options.tell),
-               .period = options.rejoin_period}) {}
+bool CameraDds::Arrivals::Add(std::int64_t sent_ns) {
+  if (std::ranges::find(sent_ns_, sent_ns) != sent_ns_.end()) return false;
+  sent_ns_[next_++ % sent_ns_.size()] = sent_ns;
+  return true;
+}
+
+int CameraDds::Member::rank() const {
+  const Impl* const impl = joined->get();
+  return impl == nullptr ? 0 : impl->has_camera() ? 2 : 1;
+}
+
+CameraDds::CameraDds(Options options) : options_(std::move(options)) { members_.push_back(Join()); }
 CameraDds::~CameraDds() = default;
 
+CameraDds::Member CameraDds::Join() const {
+  return {.joined = std::make_unique<LateJoin<Impl>>(LateJoin<Impl>::Options{
+              .join = [dds = options_.dds,
+                       sensor = options_.sensor] { return Impl::Create(dds, sensor); },
+              .tell = options_.tell,
+              .period = options_.rejoin_period})};
+}
+
+void CameraDds::Renew(WallTime end) {
+  Member newest = Join();
+  const std::lock_guard lock(mutex_);
+  // A member that nothing was asked of has no answer to wait for.
+  if (members_.size() > 1 && members_.back().joined.get() != asked_) members_.pop_back();
+  members_.back().end = std::min(members_.back().end, end);
+  members_.push_back(std::move(newest));
+}
+
 Status CameraDds::Request(std::uint64_t id, WallTime since) {
-  if (Impl* impl = joined_.get()) return impl->Request(id, since);
+  const std::lock_guard lock(mutex_);
+  const WallTime now = options_.now();
+  std::erase_if(members_, [&](const Member& member) { return member.end <= now; });
+  // The newest of those with the highest rank.
+  const auto asked =
+      std::ranges::max_element(members_.rbegin(), members_.rend(), {}, &Member::rank).base() - 1;
+  const bool again = std::exchange(asked_, asked->joined.get()) == asked->joined.get();
+  if (again) members_.erase(members_.begin(), asked);
+  if (Impl* impl = asked_->get()) return impl->Request(id, since);
   return Fail(ErrorCode::kUnavailable,
               "the camera cannot be asked: the DDS domain is not joined yet (see the log)");
 }
 
 Result<std::optional<Exposure>> CameraDds::Take() {
-  if (Impl* impl = joined_.get()) return impl->Take();
+  const std::lock_guard lock(mutex_);
+  for (const Member& member : members_) {
+    Impl* const impl = member.joined->get();
+    if (impl == nullptr) continue;
+    auto taken = impl->Take(&arrived_);
+    if (!taken || *taken) return taken;
+  }
   return std::optional<Exposure>();
 }
 

@@ -24,6 +24,9 @@ class CameraPort {
   /// Errors: kInvalid: the data received is no exposure; kUnavailable: nothing can arrive at all.
   /// The next call may succeed.
   virtual Result<std::optional<Exposure>> Take() = 0;
+  /// There are new credentials, for a port that uses any; those in use end at `end`. Any thread may
+  /// call.
+  virtual void Renew(WallTime /*end*/) {}
 };
 
 }  // namespace focalfleet

@@ -33,9 +33,10 @@ void CredentialWatch::Look() {
   const bool good = ends->front().at_s > now.ns / 1'000'000'000;
   if (settled && good && state != used_) {
     used_ = state;
-    options_.renew();
+    options_.renew(std::exchange(used_end_, kNoEnd));
   }
   if (state != used_) return;  // what participants use is no longer there to be read
+  used_end_ = {ends->front().at_s * 1'000'000'000};
   if (const auto note = clock_.Look(*ends, now)) options_.note(*note);
 }
 

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -19,7 +21,8 @@ class CredentialWatch {
     std::string folder;
     /// All functions are called on the thread of the watch.
     std::function<void(const ShellNote&)> note = [](const ShellNote&) {};
-    std::function<void()> renew = [] {};
+    /// There are other credentials. Those in use end at `end`; the latest time there is: unknown.
+    std::function<void(WallTime end)> renew = [](WallTime) {};
     /// Receives each new reason why the files cannot be read.
     std::function<void(const std::string&)> tell = [](const std::string&) {};
     std::function<WallTime()> now = &WallTime::Now;
@@ -35,9 +38,11 @@ class CredentialWatch {
  private:
   void Look();
 
+  static constexpr WallTime kNoEnd{std::numeric_limits<std::int64_t>::max()};
   Options options_;
   CredentialClock clock_;
   std::string used_;  // state of the files that participants use
+  WallTime used_end_ = kNoEnd;
   std::string seen_;  // at the last look
   std::string trouble_;
   std::jthread thread_;

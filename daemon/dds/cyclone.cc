@@ -62,6 +62,15 @@ void WriteLogLine(void* /*unused*/, const dds_log_data_t* line) {
   if (!text.empty()) std::fprintf(stderr, "%s\n", text.c_str());
 }
 
+/// Cyclone merges the fragments of a list.
+std::string ConfigurationOf(const DdsOptions& options, std::uint32_t id) {
+  std::string xml = options.config_xml.empty() ? kLoopbackConfig : options.config_xml;
+  if (id != options.domain)
+    xml += ",<Discovery><ExternalDomainId>" + std::to_string(options.domain) +
+           "</ExternalDomainId></Discovery>";
+  return xml;
+}
+
 }  // namespace
 
 Entity::~Entity() {
@@ -73,14 +82,21 @@ tl::unexpected<Error> DdsFailure(const char* what, std::int32_t code) {
               std::string("DDS: cannot ") + what + ": " + dds_strretcode(-code));
 }
 
-Result<Domain> Domain::Acquire(std::uint32_t id, const std::string& config_xml) {
+Result<Domain> Domain::Acquire(const DdsOptions& options) {
   Domains& domains = TheDomains();
   const std::lock_guard lock(domains.mutex);
+  std::uint32_t id = options.domain;
+  if (!options.security.empty() && domains.held[id].users > 0) {
+    id = kDomainBesideFirst;
+    while (id <= kDomainBesideLast && domains.held[id].users > 0) ++id;
+    if (id > kDomainBesideLast)
+      return Fail(ErrorCode::kUnavailable,
+                  "DDS: this process has too many participants with credentials");
+  }
   Held& held = domains.held[id];
   if (held.users == 0) {
     dds_set_log_sink(&WriteLogLine, nullptr);
-    const char* xml = config_xml.empty() ? kLoopbackConfig : config_xml.c_str();
-    held.entity = dds_create_domain(id, xml);
+    held.entity = dds_create_domain(id, ConfigurationOf(options, id).c_str());
     if (held.entity < 0)
       return DdsFailure("set up the domain (see its own message on stderr)",
                         std::exchange(held.entity, 0));
@@ -100,40 +116,43 @@ Domain::~Domain() {
   if (--held.users == 0 && held.entity > 0) dds_delete(std::exchange(held.entity, 0));
 }
 
-Result<Entity> MakeParticipant(std::uint32_t domain, const std::string& security) {
+Result<Participant> Participant::Join(const DdsOptions& options) {
+  Participant participant;
+  FOCALFLEET_TRY_ASSIGN(participant.domain_, Domain::Acquire(options));
   std::unique_ptr<dds_qos_t, DeleteQos> qos;
-  if (!security.empty()) {
+  if (!options.security.empty()) {
     qos.reset(dds_create_qos());
-    for (const auto& [name, value] : SecurityProperties(security))
+    for (const auto& [name, value] : SecurityProperties(options.security))
       dds_qset_prop(qos.get(), name.c_str(), value.c_str());
   }
-  const dds_entity_t participant = dds_create_participant(domain, qos.get(), nullptr);
-  if (participant < 0) return DdsFailure("join the domain", participant);
-  return Entity(participant);
+  const dds_entity_t entity = dds_create_participant(participant.domain_.id(), qos.get(), nullptr);
+  if (entity < 0) return DdsFailure("join the domain", entity);
+  participant.entity_ = Entity(entity);
+  return participant;
 }
 
-Result<Handle> MakeTopic(const Entity& participant, const dds_topic_descriptor& type,
+Result<Handle> MakeTopic(const Participant& participant, const dds_topic_descriptor& type,
                          const char* name) {
   const dds_entity_t topic = dds_create_topic(participant.get(), &type, name, nullptr, nullptr);
   if (topic < 0) return DdsFailure(name, topic);
   return topic;
 }
 
-Result<Handle> MakeWriter(const Entity& participant, Handle topic) {
+Result<Handle> MakeWriter(const Participant& participant, Handle topic) {
   const dds_entity_t writer =
       dds_create_writer(participant.get(), topic, SharedQos().get(), nullptr);
   if (writer < 0) return DdsFailure("make a writer", writer);
   return writer;
 }
 
-Result<Handle> MakeReader(const Entity& participant, Handle topic) {
+Result<Handle> MakeReader(const Participant& participant, Handle topic) {
   const dds_entity_t reader =
       dds_create_reader(participant.get(), topic, SharedQos().get(), nullptr);
   if (reader < 0) return DdsFailure("make a reader", reader);
   return reader;
 }
 
-Result<Handle> MakeListener(const Entity& participant, Handle topic, std::int32_t depth) {
+Result<Handle> MakeListener(const Participant& participant, Handle topic, std::int32_t depth) {
   const std::unique_ptr<dds_qos_t, DeleteQos> qos(dds_create_qos());
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
   dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);

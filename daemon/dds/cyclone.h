@@ -3,9 +3,9 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <utility>
 
+#include "daemon/dds/dds_options.h"
 #include "protocol/base/result.h"
 
 struct dds_topic_descriptor;
@@ -41,12 +41,12 @@ class Entity {
   Handle handle_ = 0;
 };
 
-/// Holds a domain in this process. Cyclone configures a domain once for each process, so publisher
-/// and reader of one process share it. The first one's configuration holds until the last one is
-/// gone.
+/// Holds a domain of Cyclone in this process. Without credentials, all participants of a domain
+/// share it, and the first one's configuration holds until the last one is gone. With credentials,
+/// each participant has one of its own (DdsOptions).
 class Domain {
  public:
-  static Result<Domain> Acquire(std::uint32_t id, const std::string& config_xml);
+  static Result<Domain> Acquire(const DdsOptions& options);
   Domain() = default;
   Domain(Domain&& other) noexcept : id_(other.id_), held_(std::exchange(other.held_, false)) {}
   Domain& operator=(Domain&& other) noexcept {
@@ -55,23 +55,33 @@ class Domain {
     return *this;
   }
   ~Domain();
+  [[nodiscard]] std::uint32_t id() const { return id_; }  // within this process
 
  private:
   std::uint32_t id_ = 0;
   bool held_ = false;
 };
 
+/// A participant, and its domain for as long as the participant is there.
+class Participant {
+ public:
+  /// Errors: kUnavailable: also where credentials are missing, do not fit or have ended.
+  static Result<Participant> Join(const DdsOptions& options);
+  [[nodiscard]] Handle get() const { return entity_.get(); }
+
+ private:
+  Domain domain_;
+  Entity entity_;
+};
+
 /// The error of a DDS call that returned `code` < 0.
 [[nodiscard]] tl::unexpected<Error> DdsFailure(const char* what, std::int32_t code);
 
-/// `security` is a folder of credentials (credentials.h); empty: without DDS Security. Errors:
-/// kUnavailable: also where credentials are missing, do not fit or have ended.
-Result<Entity> MakeParticipant(std::uint32_t domain, const std::string& security);
-Result<Handle> MakeTopic(const Entity& participant, const dds_topic_descriptor& type,
+Result<Handle> MakeTopic(const Participant& participant, const dds_topic_descriptor& type,
                          const char* name);
-Result<Handle> MakeWriter(const Entity& participant, Handle topic);
-Result<Handle> MakeReader(const Entity& participant, Handle topic);
+Result<Handle> MakeWriter(const Participant& participant, Handle topic);
+Result<Handle> MakeReader(const Participant& participant, Handle topic);
 /// A reader that receives each sample from now on, and keeps the last `depth` of them.
-Result<Handle> MakeListener(const Entity& participant, Handle topic, std::int32_t depth);
+Result<Handle> MakeListener(const Participant& participant, Handle topic, std::int32_t depth);
 
 }  // namespace focalfleet::dds_internal

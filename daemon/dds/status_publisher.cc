@@ -55,8 +55,7 @@ class StatusPublisher::Impl {
  public:
   static Result<std::unique_ptr<Impl>> Create(const DdsOptions& options) {
     auto impl = std::make_unique<Impl>();
-    FOCALFLEET_TRY_ASSIGN(impl->domain_, Domain::Acquire(options.domain, options.config_xml));
-    FOCALFLEET_TRY_ASSIGN(impl->participant_, MakeParticipant(options.domain, options.security));
+    FOCALFLEET_TRY_ASSIGN(impl->participant_, Participant::Join(options));
     // The switch must come after the participant and before the writers: writers made earlier
     // ignore it.
     dds_write_set_batch(true);
@@ -157,6 +156,9 @@ class StatusPublisher::Impl {
                ? status.current_count
                : 0;
   }
+  [[nodiscard]] bool acknowledged() const {
+    return dds_wait_for_acks(unit_writer_, 0) == DDS_RETCODE_OK;
+  }
 
  private:
   static std::uint64_t IdOf(const UnitStatusValue& value) { return value.unit.value; }
@@ -208,8 +210,7 @@ class StatusPublisher::Impl {
     alarms_.pop_front();
   }
 
-  Domain domain_;  // outlives the participant
-  Entity participant_;
+  Participant participant_;
   Handle fleet_writer_ = 0;
   Handle unit_writer_ = 0;
   Handle orientation_writer_ = 0;
@@ -255,5 +256,6 @@ Status StatusPublisher::Publish(const AlarmValue& alarm) { return impl_->Publish
 void StatusPublisher::Flush() { impl_->Flush(); }
 const PublisherCounters& StatusPublisher::counters() const { return impl_->counters(); }
 std::uint32_t StatusPublisher::unit_readers() const { return impl_->unit_readers(); }
+bool StatusPublisher::acknowledged() const { return impl_->acknowledged(); }
 
 }  // namespace focalfleet

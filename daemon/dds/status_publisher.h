@@ -14,22 +14,12 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string>
 
+#include "daemon/dds/dds_options.h"
 #include "daemon/dds/status_values.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet {
-
-struct DdsOptions {
-  std::uint32_t domain = 0;
-  /// Cyclone's configuration as XML or as file:// URI. Empty: the text of deploy/cyclonedds.xml,
-  /// which uses the loopback interface only. The environment is not read: CYCLONEDDS_URI decides
-  /// the destination only for a program that passes it here.
-  std::string config_xml;
-  /// Folder of credentials for DDS Security (credentials.h); empty: without.
-  std::string security = {};
-};
 
 struct PublisherCounters {
   std::uint64_t samples = 0;
@@ -67,6 +57,8 @@ class StatusPublisher {
 
   [[nodiscard]] const PublisherCounters& counters() const;
   [[nodiscard]] std::uint32_t unit_readers() const;  // readers matched with the unit topic now
+  /// These readers have acknowledged all that was flushed of it.
+  [[nodiscard]] bool acknowledged() const;
 
   static constexpr std::size_t kAlarmsKept = 1024;
 

@@ -15,10 +15,7 @@ class StatusReader::Impl {
  public:
   static Result<std::unique_ptr<Impl>> Create(const Options& options) {
     auto impl = std::make_unique<Impl>();
-    FOCALFLEET_TRY_ASSIGN(impl->domain_,
-                          Domain::Acquire(options.dds.domain, options.dds.config_xml));
-    FOCALFLEET_TRY_ASSIGN(impl->participant_,
-                          MakeParticipant(options.dds.domain, options.dds.security));
+    FOCALFLEET_TRY_ASSIGN(impl->participant_, Participant::Join(options.dds));
     const dds_entity_t waitset = dds_create_waitset(impl->participant_.get());
     if (waitset < 0) return DdsFailure("make a waitset", waitset);
     impl->waitset_ = waitset;
@@ -131,8 +128,7 @@ class StatusReader::Impl {
     }
   }
 
-  Domain domain_;  // outlives the participant
-  Entity participant_;
+  Participant participant_;
   Handle waitset_ = 0;
   Handle fleet_ = 0;
   Handle configuration_ = 0;

@@ -15,6 +15,7 @@
 #include <sstream>
 #include <utility>
 
+#include "daemon/dds/dds_options.h"
 #include "daemon/process/config_keys.h"
 
 namespace focalfleet {
@@ -291,6 +292,10 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
                   "drop_place", "camera.drop_place is of camera.directory, which is empty");
   reader->Require(!config.camera.dds || config.camera.directory.empty(), "camera", "dds",
                   "a camera answers through camera.directory or through camera.dds, not both");
+  reader->Require(config.dds.security.empty() || config.dds.domain < kDomainBesideFirst, "dds",
+                  "domain",
+                  "dds.domain is 0..223 with dds.security: the daemon needs the numbers above for "
+                  "participants that join with renewed credentials");
   reader->Require(IsNumericAddress(config.metrics.address), "metrics", "address",
                   "metrics.address must be a numeric address of this host, such as \"127.0.0.1\"");
   reader->Require(!config.fleet.units.empty(), "fleet", "units", "fleet.units must name a file");

@@ -10,14 +10,13 @@
 #include <memory>
 #include <utility>
 
-#include "daemon/camera/camera_dds.h"
-#include "daemon/camera/camera_folder.h"
 #include "daemon/clock/process_time.h"
 #include "daemon/loop/event_loop.h"
 #include "daemon/metrics/metrics_endpoint.h"
 #include "daemon/metrics/metrics_sampler.h"
 #include "daemon/page/plan_motion.h"
 #include "daemon/process/bounded_end.h"
+#include "daemon/process/camera_setup.h"
 #include "daemon/process/caught_jobs.h"
 #include "daemon/process/control_door.h"
 #include "daemon/process/counted_commit.h"
@@ -65,8 +64,10 @@ struct Service {
 /// Where places of units come from. The thread ends before the workers that it uses.
 struct Measuring {
   std::unique_ptr<CameraWorker> camera;          // none: there is no camera
+  CameraPort* port = nullptr;                    // of the camera, which owns it
   std::unique_ptr<FibreCarrierWorker> carriers;  // none: no unit has sensors of its own
   std::unique_ptr<CameraThread> thread;          // none: neither camera nor sensors
+  std::unique_ptr<CredentialWatch> credentials;  // none: no DDS Security. Renews camera and status
 };
 
 /// Where requests come in.
@@ -179,6 +180,12 @@ Status Daemon::Start() {
   FOCALFLEET_TRY(OpenCamera());
   FOCALFLEET_TRY_ASSIGN(measuring_.carriers, OpenFibreCarriers(config_.hall, *layout_));
   OpenStatusOutput(config_, *layout_, service_.started, clock_, &status_);
+  if (status_.publisher != nullptr || config_.camera.dds)
+    measuring_.credentials =
+        WatchCredentials(config_.dds, status_.troubles.get(), [this](WallTime end) {
+          if (status_.publisher != nullptr) status_.publisher->Renew(end);
+          if (measuring_.port != nullptr) measuring_.port->Renew(end);
+        });
   OpenMetrics();
   std::vector<UnitDrive> drives(layout_->size(), config_.drive);
   FOCALFLEET_TRY_ASSIGN(
@@ -243,18 +250,8 @@ void Daemon::ServeMetrics() {
 Status Daemon::OpenCamera() {
   if (!config_.camera.present()) return {};
   FOCALFLEET_TRY_ASSIGN(CameraSite site, LoadCameraSite(config_.camera));
-  std::unique_ptr<CameraPort> port;
-  if (config_.camera.dds) {
-    port = std::make_unique<CameraDds>(CameraDds::Options{
-        .dds = DdsOptionsOf(config_.dds), .sensor = site.sensor, .tell = [this](const auto& text) {
-          status_.troubles->Report(AlarmName::kCameraDdsMissing, "the camera", text);
-        }});
-  } else {
-    FOCALFLEET_TRY_ASSIGN(
-        port, CameraFolder::Open(config_.camera.directory, site.sensor,
-                                 config_.camera.drop_place ? CameraFolder::Place::kDropPlace
-                                                           : CameraFolder::Place::kFolder));
-  }
+  FOCALFLEET_TRY_ASSIGN(auto port, OpenCameraPort(config_, site.sensor, status_.troubles.get()));
+  measuring_.port = port.get();
   measuring_.camera = std::make_unique<CameraWorker>(
       std::move(port),
       CameraWorker::Options{
@@ -434,7 +431,7 @@ Status Daemon::End() {
   doors_.handler->Close();
   status_.ending =
       std::make_unique<BoundedEnd>(std::vector<BoundedEnd::Part>{{"the status", [this] {
-                                                                    status_.credentials.reset();
+                                                                    measuring_.credentials.reset();
                                                                     status_.thread.reset();
                                                                     status_.publisher.reset();
                                                                   }}});

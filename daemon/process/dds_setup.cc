@@ -21,15 +21,15 @@ void WarnOfDdsEnvironment(const DaemonConfig::Dds& dds) {
 
 std::unique_ptr<CredentialWatch> WatchCredentials(const DaemonConfig::Dds& dds,
                                                   DdsTroubles* troubles,
-                                                  std::function<void()> renew) {
+                                                  std::function<void(WallTime end)> renew) {
   if (dds.security.empty()) return nullptr;
   return std::make_unique<CredentialWatch>(CredentialWatch::Options{
       .folder = dds.security,
       .note = [troubles](const ShellNote& note) { troubles->Note(note); },
       .renew =
-          [renew = std::move(renew)] {
+          [renew = std::move(renew)](WallTime end) {
             spdlog::info("DDS: new credentials, a new participant joins beside the old one");
-            renew();
+            renew(end);
           },
       .tell =
           [](const std::string& trouble) {

@@ -16,10 +16,10 @@ DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds);
 /// The log says that $CYCLONEDDS_URI is not read, where it is set.
 void WarnOfDdsEnvironment(const DaemonConfig::Dds& dds);
 
-/// Warnings of the watch go to `troubles`; `renew` makes participants anew. Null: there is no DDS
-/// Security. Both outlive the watch.
+/// Warnings of the watch go to `troubles`; `renew` makes participants anew, as that of
+/// CredentialWatch. Null: there is no DDS Security. Both outlive the watch.
 std::unique_ptr<CredentialWatch> WatchCredentials(const DaemonConfig::Dds& dds,
                                                   DdsTroubles* troubles,
-                                                  std::function<void()> renew);
+                                                  std::function<void(WallTime end)> renew);
 
 }  // namespace focalfleet

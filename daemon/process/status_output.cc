@@ -16,8 +16,6 @@ void OpenPublisher(const DaemonConfig::Dds& dds, StatusOutput* out) {
                      troubles->Report(AlarmName::kDdsMissing, "status", trouble);
                    }},
       .renews = !dds.security.empty()});
-  out->credentials =
-      WatchCredentials(dds, troubles, [publisher = out->publisher.get()] { publisher->Renew(); });
 }
 
 }  // namespace

@@ -23,7 +23,6 @@ namespace focalfleet {
 struct StatusOutput {
   std::unique_ptr<DdsTroubles> troubles;
   std::unique_ptr<RenewingStatusPublisher> publisher;  // none: DDS is off
-  std::unique_ptr<CredentialWatch> credentials;        // none: no DDS Security
   KeptPlans plans;                                     // empty where there is no HTTP door
   NightCurves night;                                   // likewise
   std::unique_ptr<PlateFeed> page;                     // none: there is no HTTP door

@@ -31,6 +31,16 @@ class BufferedStatusPublisher {
   // ---- any thread may ask
 
   [[nodiscard]] bool joined() const { return joined_.get() != nullptr; }
+  /// Readers matched with the unit topic now.
+  [[nodiscard]] std::uint32_t unit_readers() const {
+    const StatusPublisher* const joined = joined_.get();
+    return joined != nullptr ? joined->unit_readers() : 0;
+  }
+  /// All readers have acknowledged what was published of units.
+  [[nodiscard]] bool acknowledged() const {
+    const StatusPublisher* const joined = joined_.get();
+    return joined != nullptr && joined->acknowledged();
+  }
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 

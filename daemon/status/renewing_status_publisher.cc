@@ -32,7 +32,9 @@ RenewingStatusPublisher::RenewingStatusPublisher(Options options)
 bool RenewingStatusPublisher::Publish(const StatusBatch& status) {
   if (options_.renews) Remember(status);
   RenewIfAsked();
-  const bool waits = current_->Publish(status);
+  HandOverIfFollowed();
+  bool waits = current_->Publish(status);
+  if (next_ != nullptr) waits = next_->Publish(status) || waits;
   Count();
   return waits;
 }
@@ -44,6 +46,7 @@ void RenewingStatusPublisher::Publish(const AlarmValue& alarm) {
   }
   RenewIfAsked();
   current_->Publish(alarm);
+  if (next_ != nullptr) next_->Publish(alarm);
   Count();
 }
 
@@ -56,24 +59,46 @@ void RenewingStatusPublisher::Remember(const StatusBatch& status) {
   if (status.audit_head) rest_.audit_head = status.audit_head;
 }
 
-void RenewingStatusPublisher::RenewIfAsked() {
-  if (!asked_.exchange(false)) return;
-  earlier_samples_ += current_->samples();
-  earlier_bytes_ += current_->bytes();
-  current_.reset();
-  current_ = std::make_unique<BufferedStatusPublisher>(options_.join);
+StatusBatch RenewingStatusPublisher::WholeState() const {
   StatusBatch all = rest_;
   all.units = units_.values;
   all.orientations = orientations_.values;
   all.buses = buses_.values;
-  current_->Publish(all);
-  for (const AlarmValue& alarm : alarms_) current_->Publish(alarm);
+  return all;
+}
+
+void RenewingStatusPublisher::RenewIfAsked() {
+  if (next_ != nullptr || !asked_.exchange(false)) return;
+  end_ = {asked_end_ns_};
+  next_ = std::make_unique<BufferedStatusPublisher>(options_.join);
+  next_->Publish(WholeState());
+  for (const AlarmValue& alarm : alarms_) next_->Publish(alarm);
+}
+
+void RenewingStatusPublisher::HandOverIfFollowed() {
+  if (next_ == nullptr) return;
+  const HostInstant now = options_.clock.Now();
+  const bool all_there = next_->joined() && next_->unit_readers() >= current_->unit_readers();
+  // A reader that is known here may still wait for its own end of the handshake. A value that it
+  // has acknowledged shows that it reads.
+  if (!all_there)
+    followed_since_.reset();
+  else if (!followed_since_ && next_->acknowledged())
+    followed_since_ = now;
+  const bool followed = followed_since_ && now - *followed_since_ >= options_.settled;
+  if (!followed && options_.clock.Wall() < end_) return;
+  followed_since_.reset();
+  earlier_samples_ += current_->samples();
+  earlier_bytes_ += current_->bytes();
+  current_ = std::move(next_);
+  current_->Publish(WholeState());
   spdlog::info("DDS: a new participant has taken the place of the old one");
 }
 
 void RenewingStatusPublisher::Count() {
-  samples_ = earlier_samples_ + current_->samples();
-  bytes_ = earlier_bytes_ + current_->bytes();
+  const bool renewing = next_ != nullptr;
+  samples_ = earlier_samples_ + current_->samples() + (renewing ? next_->samples() : 0);
+  bytes_ = earlier_bytes_ + current_->bytes() + (renewing ? next_->bytes() : 0);
 }
 
 }  // namespace focalfleet

@@ -21,6 +21,7 @@ constexpr std::string_view kWays[] = {"docs/way_of_a_move.md", "docs/way_of_a_ca
                                       "docs/way_of_a_change.md"};
 
 constexpr std::string_view kFaultMatrix = "docs/fault-matrix.md";
+constexpr std::string_view kThreatModel = "docs/threat-model.md";
 
 constexpr std::string_view kFolders[] = {"protocol/", "fleet/", "sim/",   "daemon/",
                                          "tests/",    "docs/",  "deploy/"};
@@ -266,6 +267,38 @@ Complaints FaultsHaveTests(const Files& files) {
   return out;
 }
 
+// A test in backquotes: Suite.Name, also behind the name of its parameters, a file under tests/, or
+// a name that a CMakeLists.txt gives to ctest.
+bool IsTest(const Files& files, const std::set<std::string>& tests, const std::string& quote) {
+  if (tests.count(quote.substr(quote.find('/') + 1)) != 0) return true;
+  if (StartsWith(quote, "tests/")) return Exists(files, quote);
+  return std::any_of(files.begin(), files.end(), [&](const File& file) {
+    return EndsWith(file.path, "CMakeLists.txt") && ContainsWord(file.text, "NAME " + quote);
+  });
+}
+
+// Each row of a table whose last column is `tests` names its tests.
+Complaints AttacksHaveTests(const Files& files) {
+  const std::set<std::string> tests = TestsOf(files);
+  Complaints out;
+  for (const File& page : files) {
+    if (page.path != kThreatModel) continue;
+    bool wants_tests = false;
+    const auto lines = Lines(page.text);
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      if (!StartsWith(lines[i], "|")) wants_tests = false;
+      if (!StartsWith(lines[i], "| ")) continue;
+      const auto cells = CellsOf(lines[i]);
+      if (!std::exchange(wants_tests, wants_tests || cells.back() == "tests")) continue;
+      const auto quotes = QuotesOf(cells.back());
+      if (quotes.empty()) out.push_back(At(page, i, "the attack has no test"));
+      for (const std::string& quote : quotes)
+        if (!IsTest(files, tests, quote)) out.push_back(At(page, i, "there is no test " + quote));
+    }
+  }
+  return out;
+}
+
 // The targets of a page's links within the repository, from its root. A folder ends with `/`.
 std::vector<std::string> LinksOf(const File& page) {
   std::vector<std::string> links;
@@ -330,6 +363,28 @@ TEST(Tidy, PagesNameTestsThatExist) { ExpectNone(PagesNameTestsThatExist(Tree())
 TEST(Tidy, FaultsHaveTests) {
   EXPECT_TRUE(Exists(Tree(), std::string(kFaultMatrix)));
   ExpectNone(FaultsHaveTests(Tree()));
+}
+
+TEST(Tidy, AttacksHaveTests) {
+  EXPECT_TRUE(Exists(Tree(), std::string(kThreatModel)));
+  ExpectNone(AttacksHaveTests(Tree()));
+}
+
+TEST(TidyRules, AttacksWithoutTestsAreCaught) {
+  const auto complaints = [](const std::string& row) {
+    return AttacksHaveTests({{"docs/threat-model.md",
+                              "| id | who |\n|---|---|\n| A1 | x |\n\n"
+                              "| attack | response | tests |\n|---|---|---|\n" +
+                                  row},
+                             {"tests/a_test.cc", "TEST_P(Door, Holds) {}\n"},
+                             {"tests/can/far", ""},
+                             {"tests/CMakeLists.txt", "add_test(NAME shell.door COMMAND x)\n"}})
+        .size();
+  };
+  EXPECT_EQ(complaints("| a | b | `Door.Holds`, `All/Door.Holds`, `shell.door` |\n"), 0u);
+  EXPECT_EQ(complaints("| a | b | `tests/can/far` |\n"), 0u);
+  EXPECT_EQ(complaints("| a | b | `Door.Hold`, `shell.doo`, `tests/can/fa` |\n"), 3u);
+  EXPECT_EQ(complaints("| a | b | |\n| a | `Door.Holds` | c |\n"), 2u);
 }
 
 TEST(TidyRules, FaultsWithoutTestsAreCaught) {

@@ -246,7 +246,7 @@ TEST(Status, ACodeOutsideItsEnumIsNotWritten) {
 
 TEST(Status, ALaterVersionsCodeIsCountedNotShown) {
   auto reader = MakeReader();
-  auto participant = dds_internal::MakeParticipant(OwnDomain(), "");
+  const auto participant = dds_internal::Participant::Join(Options());
   ASSERT_TRUE(participant);
   const auto topic =
       dds_internal::MakeTopic(*participant, focalfleet_UnitStatus_desc, dds_internal::kUnitTopic);

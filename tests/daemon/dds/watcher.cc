@@ -1,5 +1,7 @@
-// The watcher reads the status of units as a monitor does, and prints each second how many units it
-// knows, how many samples have come and the longest time without any, in ms, until its stdin ends.
+// The watcher reads the status of units as a monitor does, until its stdin ends. Each second it
+// prints how many units it knows, how many samples have come, the longest time without any in ms,
+// and how many values of units were missed. A publisher that counts its cycles in `at` shows the
+// latter: each cycle is one value of each unit, and a value that comes twice counts once.
 //   watcher DOMAIN [CREDENTIALS]
 #include <poll.h>
 #include <unistd.h>
@@ -8,7 +10,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <set>
+#include <map>
 
 #include "daemon/dds/status_reader.h"
 
@@ -27,8 +29,9 @@ int Main(int argc, char** argv) {
     std::printf("%s\n", reader.error().text.c_str());
     return 1;
   }
-  std::set<std::uint32_t> units;
+  std::map<std::uint32_t, std::int64_t> cycle_of;  // the newest of each unit
   std::uint64_t samples = 0;
+  std::int64_t missed = 0;
   std::chrono::milliseconds longest{0};
   auto last = Clock::now();
   auto said = last;
@@ -43,11 +46,16 @@ int Main(int argc, char** argv) {
             std::max(longest, std::chrono::duration_cast<std::chrono::milliseconds>(now - last));
       last = now;
     }
-    for (const auto& unit : update.units) units.insert(unit.unit.value);
+    for (const auto& unit : update.units) {
+      const auto [known, is_new] = cycle_of.emplace(unit.unit.value, unit.at.ns);
+      if (is_new || unit.at.ns <= known->second) continue;
+      missed += unit.at.ns - known->second - 1;
+      known->second = unit.at.ns;
+    }
     samples += update.units.size();
     if (now - said < std::chrono::seconds(1)) continue;
     said = now;
-    std::printf("%zu %lu %ld\n", units.size(), samples, longest.count());
+    std::printf("%zu %lu %ld %ld\n", cycle_of.size(), samples, longest.count(), missed);
     std::fflush(stdout);
   }
   return 0;

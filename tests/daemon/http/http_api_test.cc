@@ -243,11 +243,13 @@ class HttpTlsTest : public HttpApiTest {
   /// The answer by TLS, with the certificate's name before it.
   static std::string AskByTls(const HttpServer& server, const std::string& request,
                               int version_max = TLS1_3_VERSION) {
+    return AskByTls(ConnectTo(server), request, version_max);
+  }
+  static std::string AskByTls(int fd, const std::string& request, int version_max) {
     const std::unique_ptr<SSL_CTX, Free> context(SSL_CTX_new(TLS_client_method()));
     SSL_CTX_set_min_proto_version(context.get(), TLS1_VERSION);
     SSL_CTX_set_max_proto_version(context.get(), version_max);
     SSL_CTX_set_cipher_list(context.get(), "ALL:@SECLEVEL=0");
-    const int fd = ConnectTo(server);
     std::string answer;
     {
       const std::unique_ptr<SSL, Free> tls(SSL_new(context.get()));
@@ -268,6 +270,27 @@ class HttpTlsTest : public HttpApiTest {
     }
     ::close(fd);
     return answer;
+  }
+  /// Passes bytes on in both directions until one end closes, closes both, and returns what came
+  /// from the client.
+  static std::string Relay(int client, int server) {
+    std::string heard;
+    std::array<pollfd, 2> ends{{{.fd = client, .events = POLLIN, .revents = 0},
+                                {.fd = server, .events = POLLIN, .revents = 0}}};
+    std::array<char, 4096> chunk{};
+    for (bool open = true; open && ::poll(ends.data(), ends.size(), kPatienceMs) > 0;)
+      for (std::size_t from = 0; from < 2; ++from) {
+        if (ends[from].revents == 0) continue;
+        const ssize_t got = ::recv(ends[from].fd, chunk.data(), chunk.size(), 0);
+        open = got > 0;
+        if (!open) break;
+        const auto bytes = static_cast<std::size_t>(got);
+        if (from == 0) heard.append(chunk.data(), bytes);
+        EXPECT_EQ(::send(ends[1 - from].fd, chunk.data(), bytes, MSG_NOSIGNAL), got);
+      }
+    ::close(client);
+    ::close(server);
+    return heard;
   }
   std::shared_ptr<TlsContext> Context(const TlsFiles& files) {
     auto context = TlsContext::Open(files);
@@ -294,6 +317,23 @@ TEST_F(HttpTlsTest, OldVersionsAndPlainTextGetNothing) {
   EXPECT_EQ(AskByTls(*server, Post("status", viewer_, "{}"), TLS1_1_VERSION), "");
   EXPECT_THAT(AskByTls(*server, Post("status", viewer_, "{}"), TLS1_2_VERSION), Not(""));
   EXPECT_THAT(Ask(*server, Post("status", viewer_, "{}")), Not(HasSubstr("HTTP/1.1 200")));
+}
+
+TEST_F(HttpTlsTest, ARecordedRequestSentAgainReachesNobody) {
+  const auto server = Serve(Context(MakeCertificate(folder_, "plate")));
+  const std::string request = Post("disable", operator_, R"({"unit_ids":[1]})");
+  for (const int version : {TLS1_2_VERSION, TLS1_3_VERSION}) {
+    int ends[2];
+    ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends), 0);
+    std::string recorded;
+    std::thread listener([&, end = ends[1]] { recorded = Relay(end, ConnectTo(*server)); });
+    EXPECT_THAT(AskByTls(ends[0], request, version), HasSubstr("HTTP/1.1 200"));
+    listener.join();
+    EXPECT_GT(recorded.size(), request.size());
+    const int asked = daemon_.asked();
+    EXPECT_THAT(Ask(*server, recorded), Not(HasSubstr("HTTP/1.1")));
+    EXPECT_EQ(daemon_.asked(), asked) << "TLS version " << version;
+  }
 }
 
 TEST_F(HttpTlsTest, AHandshakeThatGoesNowhereEnds) {

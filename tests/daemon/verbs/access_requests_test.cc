@@ -169,6 +169,18 @@ TEST_F(AccessRequests, LongRequestsAreKeptByTheirFrontAndTheirHash) {
   EXPECT_THAT(kept[0].request_sha256, SizeIs(64));
 }
 
+TEST_F(AccessRequests, ARecordedCommandCountsAsThatOfWhoSendsItAgain) {
+  const std::string recorded = Line("disable", {{"unit_ids", {1}}, {"reason", "x"}});
+  static_cast<void>(Ask(Role::kOperator, recorded));
+  ASSERT_THAT(commands_, SizeIs(1));
+  EXPECT_THAT(Ask(Role::kViewer, recorded), HasSubstr("may not disable"));
+  EXPECT_THAT(Ask(Role::kNone, recorded), HasSubstr("has no role here"));
+  EXPECT_THAT(commands_, SizeIs(1));
+  static_cast<void>(Ask(Role::kOperator, recorded));
+  EXPECT_THAT(commands_, SizeIs(2)) << "whoever may command may do so twice, and is named twice";
+  EXPECT_THAT(Audit(), SizeIs(3));
+}
+
 TEST_F(AccessRequests, TheDaemonItselfAsksOnBehalfOfATokensBearer) {
   const ControlRequest viewer{
       .id = 1,
