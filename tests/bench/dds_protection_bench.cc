@@ -57,14 +57,15 @@ void Run(const std::string& keys, const Load& load, Figures* figures) {
     std::exit(1);
   }
   // The watcher prints a line a second: a whole one later, all has come that will come.
-  unsigned long units = 0, samples = 0, longest_ms = 0, before = sent;
+  unsigned long units = 0, samples = 0, longest_ms = 0, missed = 0, before = sent;
   while (samples != before) {
     before = samples;
-    if (std::sscanf(watcher.Line().c_str(), "%lu %lu %lu", &units, &samples, &longest_ms) != 3)
+    if (std::sscanf(watcher.Line().c_str(), "%lu %lu %lu %lu", &units, &samples, &longest_ms,
+                    &missed) != 4)
       std::exit(1);
   }
   figures->cpu_s.push_back(cpu_s * 1000 / load.cycles);
-  figures->received_share.push_back(static_cast<double>(samples) / static_cast<double>(sent));
+  figures->received_share.push_back(1 - static_cast<double>(missed) / static_cast<double>(sent));
   figures->longest_ms.push_back(static_cast<double>(longest_ms));
 }
 
