@@ -1,12 +1,14 @@
 """DDS Security across vendors: the example monitor on Fast DDS reads a secured daemon on Cyclone DDS.
 
-With a monitor's credentials it sees all units. With a camera's, those of another authority or none it gets nothing.
+With a monitor's credentials it sees all units. With a camera's, those of another authority or none it gets nothing. A daemon
+takes renewed credentials by itself, and the monitor sees all units by these.
 
     dds_secured_monitor_test.py PROGRAMS BUILD_FOLDER
 """
 
 import subprocess
 import sys
+import time
 
 from dds_examples import ROOT, build
 from simulated_fleet import WAIT_S, SimulatedFleet
@@ -23,13 +25,16 @@ def run(program, domain, wait_s, *credentials):
     return done.returncode, (lines or [""])[-1], sum(line.startswith("unit ") for line in lines)
 
 
+def make_keys(fleet, folder, *options):
+    program = ROOT / "deploy/dds-security/make-keys"
+    subprocess.run([program, folder, "--domain", str(fleet.domain), *options], check=True, capture_output=True)
+
+
 def main(programs, folder):
     monitor = build("dds_monitor_fastdds", folder) / "dds_monitor_fastdds"
     with SimulatedFleet(programs, UNITS, speed=1, dds=True, awaited="heard", secured=True) as fleet:
         foreign = fleet.folder / "foreign"
-        subprocess.run(
-            [ROOT / "deploy/dds-security/make-keys", foreign, "--domain", str(fleet.domain)],
-            check=True, capture_output=True)  # fmt: skip
+        make_keys(fleet, foreign)
         code, last, _ = run(monitor, fleet.domain, WAIT_S, "--credentials", str(fleet.keys("monitor")))
         print(f"monitor: {last}", flush=True)
         assert code == 0 and last.startswith(f"all {UNITS} of {UNITS} units seen"), last
@@ -41,6 +46,14 @@ def main(programs, folder):
             code, _, units = run(monitor, fleet.domain, HANDSHAKES_S, *credentials)
             print(f"{who}: {units} units", flush=True)
             assert code != 0 and units == 0, f"{who}: exit {code}, {units} units"
+        make_keys(fleet, fleet.folder / "keys", "--only", "daemon:daemon")
+        until = time.monotonic() + WAIT_S
+        while "a new participant has taken the place of the old one" not in (fleet.folder / "daemon.err").read_text():
+            assert time.monotonic() < until, "the daemon does not take renewed credentials"
+            time.sleep(0.5)
+        code, last, _ = run(monitor, fleet.domain, WAIT_S, "--credentials", str(fleet.keys("monitor")))
+        print(f"monitor, after the renewal: {last}", flush=True)
+        assert code == 0 and last.startswith(f"all {UNITS} of {UNITS} units seen"), last
 
 
 main(*sys.argv[1:])
