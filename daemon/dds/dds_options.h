@@ -22,7 +22,6 @@ struct DdsOptions {
 /// of DdsOptions. Credentials name these numbers, too (deploy/dds-security/make-keys), so no domain
 /// with DDS Security may have them.
 inline constexpr std::uint32_t kDomainBesideFirst = 224;
-inline constexpr std::uint32_t kDomainBesideLast =
-    230;  // the highest that Cyclone 0.10 lets be named
+inline constexpr std::uint32_t kDomainBesideLast = 230;  // Cyclone 0.10 lets none above be named
 
 }  // namespace focalfleet

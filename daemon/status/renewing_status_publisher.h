@@ -2,7 +2,8 @@
 // new participant joins beside the old one, and both publish until each reader of the old one also
 // reads the new one. Only then the old one leaves, so readers miss nothing. While both publish,
 // readers get each value twice. A reader with many values outstanding may have got the last one
-// from the old participant, so the new one publishes the whole state once more.
+// from the old participant, so the new one publishes the whole state once more. DDS cuts the old
+// participant off when its credentials end: then it leaves in any case.
 #pragma once
 
 #include <atomic>

@@ -230,6 +230,8 @@ TEST(Config, ValueOutOfRangeIsAnErrorWithItsLine) {
   EXPECT_THAT(ErrorOf(bus + "[clock]\nspeed = 0"), HasSubstr(":4: clock.speed must be in"));
   EXPECT_THAT(ErrorOf(bus + "[clock]\nspeed = nan"), HasSubstr(":4: clock.speed must be in"));
   EXPECT_THAT(ErrorOf(bus + "[dds]\ndomain = -1"), HasSubstr(":4: dds.domain must be in 0..230"));
+  EXPECT_THAT(ErrorOf(bus + "[dds]\nsecurity = \"keys\"\ndomain = 224"),
+              HasSubstr("dds.domain is 0..223 with dds.security"));
   EXPECT_THAT(ErrorOf(bus + "[drive]\nrepeat = 256"),
               HasSubstr(":4: drive.repeat must be in 1..255"));
   EXPECT_THAT(ErrorOf(bus + "[timing]\nreply_wait_ms = 0"), HasSubstr(":4: timing.reply_wait_ms"));
