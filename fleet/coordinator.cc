@@ -199,8 +199,11 @@ Result<Preview> Coordinator::PreviewOf(const ApplyCommand& command) const {
 const UnitView& Coordinator::unit(PositionerIndex i) const { return impl_->units()[i].view; }
 
 UnitKnowledge Coordinator::KnowledgeAt(PositionerIndex i, HostInstant now) const {
-  const auto course = impl_->executor().CourseOf(i);
   const UnitView& view = unit(i);
+  const UnitKnowledge* const before = impl_->executor().BeforeOf(i);
+  if (before != nullptr && (view.phase == UnitPhase::kArmed || view.phase == UnitPhase::kReady))
+    return *before;
+  const auto course = impl_->executor().CourseOf(i);
   if (!course || view.phase != UnitPhase::kMoving) return view.knowledge;
   UnitKnowledge predicted;
   for (const Axis axis : kAxes)

@@ -64,7 +64,9 @@ class Coordinator {
   [[nodiscard]] Result<Preview> PreviewOf(const ApplyCommand& command) const;
 
   [[nodiscard]] const UnitView& unit(PositionerIndex i) const;
-  /// Knowledge for showing: as `unit(i).knowledge`, but a moving unit's is predicted at `now`.
+  /// Knowledge for showing: as `unit(i).knowledge`, but a moving unit's is predicted at `now`, and
+  /// a unit whose intent has not begun is where it was. The store has it anywhere on its way
+  /// already.
   [[nodiscard]] UnitKnowledge KnowledgeAt(PositionerIndex i, HostInstant now) const;
   [[nodiscard]] const BusView& bus(BusId bus) const;
   [[nodiscard]] const ConfigurationView& configuration() const;

@@ -51,6 +51,10 @@ class ConfigurationExecutor {
   [[nodiscard]] std::optional<Round::Course> CourseOf(PositionerIndex i) const {
     return rooms_.round.CourseOf(i);
   }
+  /// See Round::BeforeOf.
+  [[nodiscard]] const UnitKnowledge* BeforeOf(PositionerIndex i) const {
+    return rooms_.round.BeforeOf(i);
+  }
 
  private:
   [[nodiscard]] Status MayBegin(const std::string& source) const;

@@ -76,6 +76,11 @@ class Round {
     HostInstant began;
   };
   [[nodiscard]] std::optional<Course> CourseOf(PositionerIndex i) const;
+  /// Knowledge of the unit before an intent that has not begun; null: it has none.
+  [[nodiscard]] const UnitKnowledge* BeforeOf(PositionerIndex i) const {
+    const std::optional<RoundUnit::Before>& before = units_[i.value].before;
+    return before ? &before->knowledge : nullptr;
+  }
 
   /// Gives a unit a late move, under a number of its own.
   void AddLate(PositionerIndex i, const LateMove& late, MoveId move);

@@ -48,6 +48,33 @@ TEST(Configuration, SecondOneStartsFromWhereTheFirstEnded) {
   ExpectStoreTellsTheTruth(fleet, "after three configurations");
 }
 
+// The store has to claim the whole way from the commit on. Whoever looks on is shown the place
+// where the unit stands until it begins.
+TEST(Configuration, UnitThatHasNotBegunIsShownWhereItStands) {
+  InProcessFleet fleet(Small(7));
+  const Coordinator& coordinator = fleet.coordinator();
+  fleet.ApplyRandom(7);
+  std::size_t intended = 0;
+  ASSERT_TRUE(fleet.RunUntil(
+      [&] {
+        for (std::uint32_t n = 0; n < fleet.layout().size(); ++n) {
+          if (coordinator.unit({n}).phase != UnitPhase::kArmed) continue;
+          const UnitKnowledge shown = coordinator.KnowledgeAt({n}, fleet.now());
+          const UnitKnowledge& known = coordinator.unit({n}).knowledge;
+          for (const std::size_t a : {0u, 1u}) {
+            EXPECT_EQ(shown[a].low, shown[a].high) << n;
+            if (known[a].witness == Witness::kInterval) ++intended;
+            if (known[a].witness == Witness::kInterval)
+              EXPECT_TRUE(known[a].low <= shown[a].low && shown[a].low <= known[a].high) << n;
+          }
+        }
+        return coordinator.configuration().state == ConfigurationState::kMoving;
+      },
+      Seconds(60)));
+  EXPECT_GT(intended, 0u) << "no intent was seen before the start";
+  ASSERT_TRUE(fleet.RunUntilIdle());
+}
+
 TEST(Configuration, WhileOneRunsAnotherIsRefused) {
   InProcessFleet fleet(Small(9));
   fleet.ApplyRandom(9);
