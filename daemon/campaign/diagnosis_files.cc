@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daemon/campaign/verdict_sentence.h"
 #include "sim/campaigns/diagnosis/left_by.h"
 #include "sim/campaigns/effects/empirical.h"
 
@@ -173,7 +174,10 @@ json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& names) {
   json not_testable = json::array();
   for (const sim::NotTestable& cause : diagnosis.not_testable)
     not_testable.push_back({{"cause", cause.cause}, {"why", cause.why}});
+  const VerdictText text = TextOf(diagnosis);
   json report{{"verdict", sim::Name(diagnosis.verdict)},
+              {"sentence", text.says()},
+              {"numbers", text.numbers},
               {"causes", causes},
               {"unknown", unknown},
               {"not_testable", not_testable},
@@ -244,40 +248,6 @@ std::string Decimals(double value, int decimals) {
 
 std::string Significant(double value, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : "?";
-}
-
-std::string VerdictSentence(const sim::Diagnosis& diagnosis) {
-  if (diagnosis.verdict == sim::Verdict::kInsufficient)
-    return "Insufficient: " + diagnosis.insufficient + ".";
-  if (diagnosis.verdict == sim::Verdict::kConsistent)
-    return fmt::format("Consistent: the simulation explains the data to {} ({} um rms).",
-                       diagnosis.steps_limit ? "the steps that places come in" : "their noise",
-                       Decimals(diagnosis.gain.rms_after_um, 1));
-  std::string what;
-  for (const sim::CauseFound& cause : diagnosis.causes) {
-    std::string name = cause.cause;
-    for (std::size_t i = 1; i < cause.candidates.size(); ++i) name += " or " + cause.candidates[i];
-    if (cause.axis == "theta" || cause.axis == "phi") name += " of " + cause.axis;
-    what +=
-        (what.empty() ? "" : ", ") + fmt::format("{} ({} um)", name, Decimals(cause.size_um, 1));
-  }
-  const char* word = diagnosis.verdict == sim::Verdict::kUnknown     ? "Unknown"
-                     : diagnosis.verdict == sim::Verdict::kAmbiguous ? "Ambiguous"
-                                                                     : "Explained";
-  std::string text = fmt::format("{}: {}", word, what.empty() ? "no named cause" : what);
-  if (!diagnosis.unknown.empty())
-    text += fmt::format("; structure that no candidate explains remains against {} ({} um)",
-                        diagnosis.unknown.front().covariate,
-                        Decimals(diagnosis.unknown.front().size_um, 1));
-  const auto patches =
-      std::count_if(diagnosis.unknown.begin(), diagnosis.unknown.end(),
-                    [](const sim::UnknownFound& found) { return found.patched.has_value(); });
-  if (patches > 0)
-    text += fmt::format("; {} of {} such structures patched by empirical terms, which name nothing",
-                        patches, diagnosis.unknown.size());
-  return text + fmt::format("; held-out rms {} um before, {} um after.",
-                            Decimals(diagnosis.gain.rms_before_um, 1),
-                            Decimals(diagnosis.gain.rms_after_um, 1));
 }
 
 }  // namespace focalfleet

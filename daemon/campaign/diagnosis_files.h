@@ -35,9 +35,6 @@ std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names
 /// units_by_class.csv: a row a unit and axis.
 std::string WriteUnitsByClass(const sim::Diagnosis& diagnosis);
 
-/// The verdict in one sentence, for human readers.
-std::string VerdictSentence(const sim::Diagnosis& diagnosis);
-
 /// `value` for human readers, with the given number of decimals or significant digits; "?" where it
 /// is not known.
 std::string Decimals(double value, int decimals);

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daemon/campaign/cause_words.h"
+#include "daemon/campaign/diagnosis_figures.h"
+#include "daemon/campaign/verdict_sentence.h"
 #include "daemon/report/page.h"
 #include "sim/campaigns/diagnosis/next_moves.h"
 
@@ -15,118 +18,130 @@ using report::Align;
 using sim::Campaign;
 using sim::Diagnosis;
 
-constexpr std::size_t kPointsMax = 4000;
-constexpr std::size_t kCovariatesMax = 6;
-
-void AddCauses(const Diagnosis& diagnosis, report::Page* page) {
-  page->Heading("Causes");
-  if (diagnosis.causes.empty()) {
-    page->Paragraph("No misfit that chance does not explain.");
-    return;
-  }
-  std::vector<std::vector<std::string>> rows;
-  for (const sim::CauseFound& cause : diagnosis.causes) {
-    std::string rivals;
-    for (std::size_t k = 1; k < cause.candidates.size(); ++k)
-      rivals += (rivals.empty() ? "" : ", ") + cause.candidates[k];
-    rows.push_back({cause.cause, rivals.empty() ? "none" : rivals, cause.axis, cause.scope,
-                    cause.all_units ? "all" : std::to_string(cause.units.size()),
-                    fmt::format("{} ({} to {}) {}", Significant(cause.amplitude, 4),
-                                Significant(cause.ci95[0], 4), Significant(cause.ci95[1], 4),
-                                cause.amplitude_unit),
-                    Decimals(cause.size_um, 2), Decimals(2 * cause.delta_log_likelihood, 0),
-                    cause.shape});
-  }
-  page->Table({"cause", "cannot be told from", "axis", "scope", "units", "amplitude (95 %)",
-               "rms at the fibre (um)", "2 d ln L", "shape"},
-              rows,
-              {Align::kLeft, Align::kLeft, Align::kLeft, Align::kLeft, Align::kRight, Align::kLeft,
-               Align::kRight, Align::kRight, Align::kLeft});
-  for (const sim::CauseFound& cause : diagnosis.causes)
-    page->Paragraph(cause.cause + ": " + cause.paragraph);
-}
-
-void AddGain(const Diagnosis& diagnosis, report::Page* page) {
-  const sim::HeldOutGain& gain = diagnosis.gain;
-  page->Heading("Gain on moves that no fit has seen");
-  const bool exchanged = std::ranges::any_of(diagnosis.causes, [](const sim::CauseFound& cause) {
-    return cause.cause == "identity_swap";
-  });
-  if (!std::isfinite(gain.rms_before_um) || !std::isfinite(gain.rms_after_um)) {
-    page->Paragraph("No move could be held out.");
-    return;
-  }
-  page->Paragraph(gain.held_out + ".");
-  page->Plot(report::DrawBars(
-      {.title = "2-D residual",
-       .categories = {"rms", "median"},
-       .y = {.label = "residual", .unit = "um"},
-       .groups = {{exchanged ? "static geometry, exchanged names" : "static geometry alone",
-                   {gain.rms_before_um, gain.mad_before_um}},
-                  {"extended model", {gain.rms_after_um, gain.mad_after_um}}},
-       .horizontal = {{gain.noise_floor_um, "noise"}}}));
-}
-
-// A scatter plot of x against y, of at most kPointsMax rows.
-void AddScatter(const std::vector<double>& x, const std::vector<double>& y, std::size_t stride,
-                std::vector<double>* to_x, std::vector<double>* to_y) {
-  for (std::size_t row = 0; row < x.size(); row += stride)
-    if (std::isfinite(x[row]) && std::isfinite(y[row]))
-      to_x->push_back(x[row]), to_y->push_back(y[row]);
-}
-
-std::vector<double> Lengths(const std::vector<double>& x, const std::vector<double>& y) {
-  std::vector<double> lengths(x.size());
-  for (std::size_t row = 0; row < x.size(); ++row) lengths[row] = std::hypot(x[row], y[row]);
-  return lengths;
-}
-
-void AddAgainst(const std::string& name, const std::vector<double>& column,
-                const std::vector<double>& before, const std::vector<double>& after,
-                report::Page* page) {
-  const std::size_t stride = std::max<std::size_t>(1, column.size() / kPointsMax);
-  std::vector<double> bx, by, ax, ay;
-  AddScatter(column, before, stride, &bx, &by);
-  AddScatter(column, after, stride, &ax, &ay);
-  if (bx.empty() ||
-      *std::min_element(bx.begin(), bx.end()) == *std::max_element(bx.begin(), bx.end()))
-    return;
-  page->Plot(report::DrawLines(
-      {.title = "residual against " + name,
-       .x = {.label = name},
-       .y = {.label = "residual", .unit = "um"},
-       .series = {{.name = "before", .x = bx, .y = by, .style = report::Style::kDots},
-                  {.name = "after", .x = ax, .y = ay, .style = report::Style::kDots}}}));
-}
-
-void AddResiduals(const Campaign& campaign, const Diagnosis& diagnosis, report::Page* page) {
-  if (diagnosis.x_before_um.empty() || diagnosis.x_after_um.empty()) return;
-  page->Heading("Residuals");
-  const std::size_t stride = std::max<std::size_t>(1, campaign.rows() / kPointsMax);
-  std::vector<double> bx, by, ax, ay;
-  AddScatter(diagnosis.x_before_um, diagnosis.y_before_um, stride, &bx, &by);
-  AddScatter(diagnosis.x_after_um, diagnosis.y_after_um, stride, &ax, &ay);
-  page->Plot(report::DrawLines(
-      {.title = "residual vectors",
-       .x = {.label = "x", .unit = "um"},
-       .y = {.label = "y", .unit = "um"},
-       .series = {{.name = "before", .x = bx, .y = by, .style = report::Style::kDots},
-                  {.name = "after", .x = ax, .y = ay, .style = report::Style::kDots}},
-       .height_px = 480}));
-  const std::vector<double> before = Lengths(diagnosis.x_before_um, diagnosis.y_before_um);
-  const std::vector<double> after = Lengths(diagnosis.x_after_um, diagnosis.y_after_um);
-  AddAgainst("theta_cmd_deg", campaign.cmd_deg[sim::kTheta], before, after, page);
-  AddAgainst("phi_cmd_deg", campaign.cmd_deg[sim::kPhi], before, after, page);
-  std::size_t shown = 0;
-  for (const sim::Covariate& covariate : campaign.covariates)
-    if (shown < kCovariatesMax && covariate.name != "sigma_um") {
-      AddAgainst(covariate.name, covariate.values, before, after, page);
-      ++shown;
-    }
-}
+constexpr std::size_t kWorstUnits = 10;
 
 std::string PercentOf(double share) {
   return share < 0.001 ? "below 0.1 %" : fmt::format("{:.1f} %", 100 * share);
+}
+
+std::string UnitsOf(const sim::CauseFound& cause) {
+  constexpr std::size_t kNamed = 12;
+  if (cause.all_units) return "all";
+  if (cause.units.size() <= kNamed) return fmt::format("{}", fmt::join(cause.units, ", "));
+  return fmt::format("{} of them, as {}...", cause.units.size(),
+                     fmt::join(cause.units.begin(), cause.units.begin() + 6, ", "));
+}
+
+/// How far the name is to be trusted: its probability, those of its rivals, and what is excluded.
+std::string ReliabilityOf(const sim::CauseFound& cause) {
+  if (cause.candidates.size() < 2) return "no other cause of the library does this";
+  const std::vector<double> posterior = sim::PosteriorOf(cause);
+  std::string text = PercentOf(posterior.front());
+  for (std::size_t k = 1; k < cause.candidates.size(); ++k)
+    text += fmt::format("; {} {}", cause.candidates[k], PercentOf(posterior[k]));
+  return text;
+}
+
+report::Card CardOf(const sim::CauseFound& cause) {
+  const bool of_axis = cause.axis == "theta" || cause.axis == "phi" || cause.axis == "both";
+  report::Card card{
+      .heading = std::string(WordsFor(cause.cause).name) + (cause.axis == "both" ? " of both axes"
+                                                            : of_axis ? " of " + cause.axis
+                                                                      : ""),
+      .paragraphs = {cause.paragraph},
+      .facts = {{"amplitude", fmt::format("{} {} (95 %: {} to {})", Significant(cause.amplitude, 3),
+                                          cause.amplitude_unit, Significant(cause.ci95[0], 3),
+                                          Significant(cause.ci95[1], 3))},
+                {"at the fibre", Decimals(cause.size_um, 1) + " um rms"},
+                {"units", UnitsOf(cause)},
+                {"this name", ReliabilityOf(cause)}}};
+  if (!cause.cannot_be.empty())
+    card.facts.emplace_back("cannot be", fmt::format("{}", fmt::join(cause.cannot_be, ", ")));
+  if (!cause.shape.empty()) card.facts.emplace_back("shape", cause.shape);
+  if (cause.at_bound) card.facts.emplace_back("note", "as large as physics allows");
+  card.facts.emplace_back("evidence", "2 d ln L = " + Decimals(2 * cause.delta_log_likelihood, 0));
+  card.facts.emplace_back("in report.json", cause.cause + ", scope " + cause.scope);
+  return card;
+}
+
+report::Card GainCard(const Diagnosis& diagnosis) {
+  const sim::HeldOutGain& gain = diagnosis.gain;
+  report::Card card{.heading = "Gain on moves that no fit has seen", .paragraphs = {}, .facts = {}};
+  if (!std::isfinite(gain.rms_before_um) || !std::isfinite(gain.rms_after_um)) {
+    card.paragraphs = {"No move could be held out."};
+    return card;
+  }
+  const bool exchanged = std::ranges::any_of(diagnosis.causes, [](const sim::CauseFound& cause) {
+    return cause.cause == "identity_swap";
+  });
+  card.paragraphs = {gain.held_out + ".",
+                     exchanged ? "Before is static geometry with the exchanged names."
+                               : "Before is static geometry alone."};
+  const auto both = [](double before_um, double after_um) {
+    return fmt::format("{} um before, {} um after", Decimals(before_um, 1), Decimals(after_um, 1));
+  };
+  card.facts = {{"rms", both(gain.rms_before_um, gain.rms_after_um)},
+                {"median", both(gain.mad_before_um, gain.mad_after_um)},
+                {"noise", Decimals(gain.noise_floor_um, 1) + " um rms"}};
+  return card;
+}
+
+void AddCauses(const Diagnosis& diagnosis, report::Page* page) {
+  page->Heading("Causes");
+  if (diagnosis.causes.empty()) page->Paragraph("No misfit that chance does not explain.");
+  std::vector<report::Card> cards;
+  for (const sim::CauseFound& cause : diagnosis.causes) cards.push_back(CardOf(cause));
+  cards.push_back(GainCard(diagnosis));
+  page->Cards(cards);
+}
+
+void AddWorstUnits(const Campaign& campaign, const Diagnosis& diagnosis,
+                   const sim::UnitResiduals& units, report::Page* page) {
+  std::vector<std::size_t> order;
+  for (std::size_t u = 0; u < units.after_um.size(); ++u)
+    if (std::isfinite(units.after_um[u])) order.push_back(u);
+  const std::size_t shown = std::min(kWorstUnits, order.size());
+  std::ranges::partial_sort(
+      order, order.begin() + static_cast<std::ptrdiff_t>(shown),
+      [&](std::size_t a, std::size_t b) { return units.after_um[a] > units.after_um[b]; });
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t k = 0; k < shown; ++k) {
+    const std::uint32_t id = campaign.units[order[k]].id;
+    std::string classes[2];
+    for (const sim::AxisReport& axis : diagnosis.axes)
+      if (axis.unit_id == id) classes[axis.axis] = sim::Name(axis.is);
+    rows.push_back({std::to_string(id), Decimals(units.before_um[order[k]], 1),
+                    Decimals(units.after_um[order[k]], 1), classes[0], classes[1]});
+  }
+  page->Heading("Units farthest from the model");
+  page->Table({"unit", "before (um rms)", "after (um rms)", "theta", "phi"}, rows,
+              {Align::kRight, Align::kRight, Align::kRight});
+}
+
+void AddResiduals(const Campaign& campaign, const Diagnosis& diagnosis, report::Page* page) {
+  const DiagnosisFigures figures(campaign, diagnosis);
+  if (figures.empty()) return;
+  page->Heading("Where on the plate");
+  page->Figures(figures.Maps());
+  page->Hint(
+      "Before is static geometry alone, after is the extended model. Amplitudes are sizes; a "
+      "hollow "
+      "unit does not have the effect.");
+  page->Figures(figures.Arrows());
+  page->Hint(
+      "Arrows go from the predicted place to the measured one, in the move whose errors were "
+      "largest.");
+  for (const std::size_t axis : {sim::kTheta, sim::kPhi}) {
+    page->Heading(axis == sim::kTheta ? "Errors of theta" : "Errors of phi");
+    page->Figures(figures.Against(axis));
+    page->Plot(figures.Spectrum(axis));
+  }
+  page->Hint(
+      "Signed, measured less predicted, where the pose of the arms separates the two axes. Lines "
+      "are "
+      "medians, the clearest structure first; the outermost hundredths of the errors may be beyond "
+      "the axes. A spectrum is the root mean square over units, each with its own phase.");
+  AddWorstUnits(campaign, diagnosis, figures.units(), page);
 }
 
 // The table of what further moves would decide, pair by pair.
@@ -191,13 +206,15 @@ void AddRest(const Diagnosis& diagnosis, report::Page* page) {
 std::string DiagnosisPage(const Campaign& campaign, const Diagnosis& diagnosis,
                           const ReportNames& names) {
   report::Page page("Diagnosis of " + names.campaign);
-  page.Paragraph(VerdictSentence(diagnosis));
-  page.Paragraph(fmt::format("{} rows of {} units, {} moves; SHA-256 of the tables {}.",
-                             diagnosis.rows, diagnosis.units, diagnosis.moves, names.sha256));
+  const VerdictText verdict = TextOf(diagnosis);
+  page.Wide();
+  for (const std::string& line : verdict.lines) page.Lead(line);
+  if (!verdict.numbers.empty()) page.Paragraph(verdict.numbers);
+  page.Hint(fmt::format("{} rows of {} units, {} moves; SHA-256 of the tables {}.", diagnosis.rows,
+                        diagnosis.units, diagnosis.moves, names.sha256));
   for (const std::string& remark : diagnosis.remarks) page.Paragraph("Note: " + remark + ".");
   if (diagnosis.verdict == sim::Verdict::kInsufficient) return page.Html();
   AddCauses(diagnosis, &page);
-  AddGain(diagnosis, &page);
   AddResiduals(campaign, diagnosis, &page);
   AddRest(diagnosis, &page);
   return page.Html();

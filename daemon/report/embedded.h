@@ -6,6 +6,8 @@
 
 namespace focalfleet::report {
 
+extern const std::string_view kPageStyle;
+extern const std::string_view kPlotStyle;
 extern const std::string_view kPlanPageStyle;
 extern const std::string_view kPlanPageBody;
 extern const std::string_view kPlanPageScript;

@@ -12,7 +12,6 @@
 namespace focalfleet::report {
 namespace {
 
-constexpr double kPlotWidthPx = 760;
 constexpr double kRightPx = 28;  // room for half of the last label
 constexpr double kCharacterPx = 6.8;
 constexpr double kLinePx = 17;
@@ -276,7 +275,7 @@ std::string AxisTitle(const Axis& axis, int exponent) {
 void PlaceArea(const std::vector<std::string>& categories, Frame* frame) {
   frame->left_px = 12 + WidestOf(frame->y_marks) + (frame->y_title.empty() ? 0 : 16);
   frame->left_px = std::max(frame->left_px, 60.0);
-  frame->width_px = kPlotWidthPx - kRightPx - frame->left_px;
+  frame->width_px = frame->whole_width_px - kRightPx - frame->left_px;
   if (categories.empty()) return;
 
   frame->x_marks_are_categories = true;
@@ -338,8 +337,9 @@ Svg Assemble(const Frame& frame) {
   const double height = below + kLinePx * static_cast<double>(frame.notes.size());
 
   std::string out;
-  Write(&out, R"(<svg class="plot" role="img" aria-label="{}" viewBox="0 0 {:.0f} {:.0f}">)",
-        EscapeMarkup(frame.title.empty() ? frame.y_title : frame.title), kPlotWidthPx,
+  Write(&out, R"(<svg class="plot{}" role="img" aria-label="{}" viewBox="0 0 {:.0f} {:.0f}">)",
+        frame.whole_width_px < kPlotWidth_px ? " small" : "",
+        EscapeMarkup(frame.title.empty() ? frame.y_title : frame.title), frame.whole_width_px,
         std::ceil(height));
   if (!frame.title.empty()) {
     Write(&out, R"(<text class="title" x="{:.2f}" y="15">{}</text>)", frame.left_px,

@@ -1,7 +1,6 @@
 // Frame is what surrounds the data of a plot: title, legend, axes with their ticks, reference
 // lines, notes. Everything is placed by an estimate of the width of text, because only the viewer
-// knows its font. The estimate errs on the wide side. Places are in pixels of a drawing that is 760
-// wide.
+// knows its font. The estimate errs on the wide side. Places are in pixels of the drawing.
 #pragma once
 
 #include <cstddef>
@@ -62,6 +61,7 @@ struct Frame {
   std::vector<Mark> vertical;
   std::vector<std::string> notes;
   std::string drawing;  // markup, clipped to the area
+  double whole_width_px = kPlotWidth_px;
   double left_px = 0;
   double width_px = 0;
   double height_px = 0;

@@ -3,38 +3,19 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "daemon/report/embedded.h"
 #include "daemon/report/escape.h"
 #include "protocol/base/check.h"
 
 namespace focalfleet::report {
 namespace {
 
-constexpr std::string_view kPageStyle =
-    R"(:root{color-scheme:light dark;--paper:#fff;--ink:#1b1f23;--muted:#5f6870;--grid:#e3e6e9}
-:root{--blue:#0072b2}
-@media screen and (prefers-color-scheme:dark){
-:root{--paper:#15181c;--ink:#e4e7ea;--muted:#98a1aa;--grid:#2d3339;--blue:#1f8fd6}}
-body{margin:0 auto;padding:1.5rem;max-width:50.5rem;box-sizing:border-box}
-body{background:var(--paper);color:var(--ink);font:15px/1.5 system-ui,"DejaVu Sans",sans-serif}
-h1{font-size:1.6rem;line-height:1.25;margin:0 0 1rem}
-h2{font-size:1.2rem;margin:2rem 0 .6rem;break-after:avoid}
-p{max-width:46rem;margin:.6rem 0}
-body{overflow-wrap:break-word}
-.table{overflow-x:auto;margin:1rem 0}
-table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
-th,td{padding:.3rem .7rem;text-align:left;vertical-align:top;min-width:3rem}
-th{border-bottom:2px solid var(--muted)}
-td{border-bottom:1px solid var(--grid)}
-.right{text-align:right}
-tr,figure{break-inside:avoid}
-figure{margin:1.2rem 0}
-figcaption{color:var(--muted);font-size:.9rem;max-width:46rem;margin-top:.3rem}
-@media print{body{max-width:none;padding:0}.table{overflow:visible}}
-)";
-
-std::string Element(std::string_view name, std::string_view text) {
+/// `classes`: of the style sheet; empty: none.
+std::string Element(std::string_view name, std::string_view text, std::string_view classes = "") {
   std::string out = "<";
-  out.append(name).append(">").append(EscapeMarkup(text));
+  out.append(name);
+  if (!classes.empty()) out.append(" class=\"").append(classes).append("\"");
+  out.append(">").append(EscapeMarkup(text));
   return out.append("</").append(name).append(">\n");
 }
 
@@ -60,6 +41,43 @@ Page& Page::Heading(std::string_view text) {
 
 Page& Page::Paragraph(std::string_view text) {
   body_ += Element("p", text);
+  return *this;
+}
+
+Page& Page::Lead(std::string_view text) {
+  body_ += Element("p", text, "lead");
+  return *this;
+}
+
+Page& Page::Hint(std::string_view text) {
+  body_ += Element("p", text, "hint");
+  return *this;
+}
+
+Page& Page::Cards(const std::vector<Card>& cards) {
+  body_ += "<div class=\"cards\">\n";
+  for (const Card& card : cards) {
+    body_ += "<div class=\"card\">\n" + Element("h3", card.heading);
+    for (const std::string& text : card.paragraphs) body_ += Element("p", text);
+    if (!card.facts.empty()) body_ += "<dl>\n";
+    for (const auto& [name, value] : card.facts)
+      body_ += Element("dt", name) + Element("dd", value);
+    if (!card.facts.empty()) body_ += "</dl>\n";
+    body_ += "</div>\n";
+  }
+  body_ += "</div>\n";
+  return *this;
+}
+
+Page& Page::Figures(const std::vector<Svg>& figures) {
+  body_ += "<div class=\"figures\">\n";
+  for (const Svg& figure : figures) body_ += figure.text;
+  body_ += "</div>\n";
+  return *this;
+}
+
+Page& Page::Wide() {
+  wide_ = true;
   return *this;
 }
 
@@ -91,7 +109,8 @@ std::string Page::Html() const {
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
       "style-src 'unsafe-inline'\"/>\n";
   out.append("<title>").append(title_).append("</title>\n<style>\n");
-  out.append(kPageStyle).append(PlotStyle()).append("</style>\n</head>\n<body>\n");
+  out.append(kPageStyle).append(PlotStyle()).append("</style>\n</head>\n");
+  out.append(wide_ ? "<body class=\"report wide\">\n" : "<body class=\"report\">\n");
   out.append("<h1>").append(title_).append("</h1>\n");
   return out.append(body_).append("</body>\n</html>\n");
 }

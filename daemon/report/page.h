@@ -9,6 +9,7 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "daemon/report/plot.h"
@@ -17,6 +18,13 @@ namespace focalfleet::report {
 
 enum class Align { kLeft, kRight };
 
+/// Card is one finding among several: what it is called, what is to be known, its numbers by name.
+struct Card {
+  std::string heading;
+  std::vector<std::string> paragraphs;
+  std::vector<std::pair<std::string, std::string>> facts;
+};
+
 class Page {
  public:
   /// A page whose title is also its first heading.
@@ -24,6 +32,11 @@ class Page {
 
   Page& Heading(std::string_view text);
   Page& Paragraph(std::string_view text);
+  /// Adds the sentence that a reader takes along who reads no other.
+  Page& Lead(std::string_view text);
+  /// Adds a pale small paragraph.
+  Page& Hint(std::string_view text);
+  Page& Cards(const std::vector<Card>& cards);
 
   /// Adds a table. Columns without an alignment are left-aligned; numbers read best right-aligned.
   /// Pre: every row is as long as the header; no more alignments than columns.
@@ -33,6 +46,10 @@ class Page {
 
   /// Adds a plot. Empty caption: none.
   Page& Plot(const Svg& svg, std::string_view caption = "");
+  /// Adds small plots, as many beside each other as the reader's window has room for.
+  Page& Figures(const std::vector<Svg>& figures);
+  /// The page takes the width that its figures can use.
+  Page& Wide();
 
   /// The whole document so far.
   [[nodiscard]] std::string Html() const;
@@ -40,6 +57,7 @@ class Page {
  private:
   std::string title_;  // escaped
   std::string body_;
+  bool wide_ = false;
 };
 
 }  // namespace focalfleet::report

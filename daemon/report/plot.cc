@@ -9,6 +9,7 @@
 #include <limits>
 #include <utility>
 
+#include "daemon/report/embedded.h"
 #include "daemon/report/escape.h"
 #include "daemon/report/frame.h"
 #include "protocol/base/check.h"
@@ -233,6 +234,7 @@ Svg DrawLines(const LinePlot& plot) {
   // A dot on the very edge would be half a dot.
   Scales scales{ScaleFor(plot.x, extents.x, dots ? 0.02 : 0.0), ScaleFor(plot.y, extents.y, 0.05)};
   Frame frame{.title = plot.title, .height_px = HeightOf(plot.height_px)};
+  frame.whole_width_px = std::clamp(plot.width_px, kSmallPlotWidth_px, kPlotWidth_px);
   scales.y.length_px = frame.height_px;
   MarkY(plot.y, scales.y, &frame);
   PlaceArea({}, &frame);
@@ -243,10 +245,12 @@ Svg DrawLines(const LinePlot& plot) {
     const Series& series = plot.series[i];
     const std::string path = PathOf(plot, series, scales);
     const Key key = series.style == Style::kDots ? Key::kDot : Key::kLine;
-    AddLegend({series.name, i, key}, !path.empty(), &frame);
+    const std::size_t colour = series.colour.value_or(i);
+    AddLegend({series.name, colour, key}, !path.empty(), &frame);
     if (path.empty()) continue;
     const std::string_view kind = series.style == Style::kDots ? "dots" : "line";
-    frame.drawing += fmt::format(R"(<path class="{} {}" d="{}"/>)", kind, SeriesClass(i), path);
+    frame.drawing += fmt::format(R"(<path class="{}{} {}" d="{}"/>)", kind,
+                                 series.faint ? " faint" : "", SeriesClass(colour), path);
   }
   SayWhereNoData(&frame);
   Note(extents.left_out, "points", &frame.notes);
@@ -306,26 +310,6 @@ Svg DrawHistogram(const Histogram& plot) {
   return Assemble(frame);
 }
 
-std::string_view PlotStyle() {
-  return R"(.plot{display:block;width:100%;max-width:760px;height:auto}
-.plot{font-size:12px;fill:var(--ink)}
-.plot .title{font-size:14px;font-weight:600}
-.plot .note{font-style:italic;fill:var(--muted)}
-.plot .grid{stroke:var(--grid);stroke-width:1}
-.plot .box{fill:none;stroke:var(--muted);stroke-width:1}
-.plot .ref{fill:none;stroke:var(--muted);stroke-width:1.2;stroke-dasharray:6 4}
-.plot .halo{paint-order:stroke;stroke:var(--paper);stroke-width:4px;stroke-linejoin:round}
-.plot .line{fill:none;stroke:var(--series);stroke-width:1.4}
-.plot .line{stroke-linejoin:round;stroke-linecap:round}
-.plot .dots{fill:none;stroke:var(--series);stroke-width:4.5;stroke-linecap:round}
-.plot .key{fill:none;stroke:var(--series);stroke-width:2.5}
-.plot .bar{fill:var(--series)}
-.plot .area{fill:var(--blue);fill-opacity:.35;stroke:var(--blue);stroke-width:1.2}
-.s0{--series:var(--blue)}.s1{--series:#d55e00}.s2{--series:#009e73}.s3{--series:#cc79a7}
-.s4{--series:#e69f00}.s5{--series:#56b4e9}.s6{--series:var(--ink)}
-.plot .line.dash1,.plot .key.dash1{stroke-dasharray:7 4}
-.plot .line.dash2,.plot .key.dash2{stroke-dasharray:2 4}
-)";
-}
+std::string_view PlotStyle() { return kPlotStyle; }
 
 }  // namespace focalfleet::report

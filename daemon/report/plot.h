@@ -45,6 +45,10 @@ struct Reference {
   std::string label;
 };
 
+/// The width of a plot that has a line of the page to itself, and of one that has others beside it.
+inline constexpr int kPlotWidth_px = 760;
+inline constexpr int kSmallPlotWidth_px = 380;
+
 /// Series is one line. NaN in x or y breaks the line there.
 /// Pre: x and y are equally long.
 /// Lifetime: DrawLines alone reads the numbers.
@@ -53,6 +57,8 @@ struct Series {
   std::span<const double> x;
   std::span<const double> y;
   Style style = Style::kLine;
+  std::optional<std::size_t> colour;  // of the palette; none: by the place in the plot
+  bool faint = false;                 // behind what the plot is about: small and pale
 };
 
 struct LinePlot {
@@ -62,7 +68,8 @@ struct LinePlot {
   std::vector<Series> series;
   std::vector<Reference> horizontal;  // at values of y
   std::vector<Reference> vertical;    // at values of x
-  int height_px = 240;                // of the area inside the axes; its width is about 640
+  int height_px = 240;                // of the area inside the axes
+  int width_px = kPlotWidth_px;       // of the whole plot; the area inside is some 120 less
 };
 
 /// The plot as SVG. Cost: O(points); memory for about 4 points a pixel column.

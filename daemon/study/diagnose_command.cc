@@ -14,6 +14,7 @@
 #include "daemon/campaign/diagnosis_files.h"
 #include "daemon/campaign/diagnosis_page.h"
 #include "daemon/campaign/next_moves_file.h"
+#include "daemon/campaign/verdict_sentence.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "sim/campaigns/diagnosis/fit.h"
@@ -19,6 +20,11 @@ struct AngleRow {
     return noise_mm / lever_mm * 180 / std::numbers::pi;
   }
 };
+
+/// The error of the axis' angle that moves the place of the move's fibre by (x, y). nullopt where
+/// the pose does not separate the axes.
+std::optional<AngleRow> AngleErrorAt(const UnitTrack& track, std::size_t move, std::size_t axis,
+                                     double x_um, double y_um);
 
 /// The errors of all rows that are not set aside. Pre: the track is of the fit's campaign and
 /// model.

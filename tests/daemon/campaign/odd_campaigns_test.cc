@@ -19,6 +19,7 @@
 #include "daemon/campaign/diagnosis_page.h"
 #include "daemon/campaign/model_file.h"
 #include "daemon/campaign/next_moves_file.h"
+#include "daemon/campaign/verdict_sentence.h"
 #include "fleet/files/layout_file.h"
 #include "tests/sim/campaigns/campaign/odd_places.h"
 #include "tests/sim/campaigns/diagnosis/planted_campaign.h"

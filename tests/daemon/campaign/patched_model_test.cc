@@ -9,6 +9,7 @@
 #include "daemon/campaign/diagnosis_files.h"
 #include "daemon/campaign/diagnosis_page.h"
 #include "daemon/campaign/model_file.h"
+#include "daemon/campaign/verdict_sentence.h"
 #include "sim/campaigns/effects/empirical.h"
 #include "tests/sim/campaigns/diagnosis/planted_campaign.h"
 
