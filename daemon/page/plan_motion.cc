@@ -65,4 +65,25 @@ std::string EncodeMotion(const Plan& plan, const Layout& layout,
   return out;
 }
 
+bool IsMotion(std::string_view bytes) {
+  constexpr std::size_t kHeadBytes = 16, kUnitBytes = 16, kRowBytes = 12, kRowsAt = 12;
+  const auto number = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, bytes.data() + at, sizeof value);
+    return value;
+  };
+  if (bytes.size() < kHeadBytes || number(0) != bytes.size() - 4 || number(4) != kMotionFormat)
+    return false;
+  std::size_t at = kHeadBytes;
+  for (std::uint32_t unit = 0; unit < number(8); ++unit) {
+    if (bytes.size() - at < kUnitBytes) return false;
+    const std::size_t rows = static_cast<unsigned char>(bytes[at + kRowsAt]) +
+                             std::size_t{static_cast<unsigned char>(bytes[at + kRowsAt + 1])};
+    at += kUnitBytes;
+    if (bytes.size() - at < rows * kRowBytes) return false;
+    at += rows * kRowBytes;
+  }
+  return at == bytes.size();
+}
+
 }  // namespace focalfleet

@@ -22,6 +22,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "fleet/drive.h"
 #include "fleet/layout.h"
@@ -31,5 +32,8 @@ namespace focalfleet {
 
 /// Shape: `drives` (n), those for which the plan was made. Cost: O(rows).
 std::string EncodeMotion(const Plan& plan, const Layout& layout, std::span<const UnitDrive> drives);
+
+/// Whether the bytes are one whole motion of this version, by their length and that of each unit.
+bool IsMotion(std::string_view bytes);
 
 }  // namespace focalfleet

@@ -2,7 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <string>
+
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -55,6 +60,74 @@ TEST(KeptPlans, AMotionThatSomebodyReadsOutlivesItsPlace) {
   plans.Put(2, "12345678");
   EXPECT_TRUE(plans.Of(1).empty());
   EXPECT_EQ(*held.front(), "12345678");
+}
+
+/// A motion of no unit, which differs by the end of its last row.
+std::string MotionEndingAt(float end_s) {
+  std::string bytes(16, '\0');
+  bytes[0] = 12;
+  bytes[4] = 1;
+  std::memcpy(bytes.data() + 12, &end_s, sizeof end_s);
+  return bytes;
+}
+
+TEST(KeptPlans, OutlastTheDaemonInAFolder) {
+  const test::ScratchFolder scratch;
+  const std::string folder = scratch / "db.plans";
+  {
+    KeptPlans plans;
+    plans.KeepIn(folder);
+    plans.Put(9, MotionEndingAt(1));
+    plans.Put(10, MotionEndingAt(2));
+    plans.Put(10, MotionEndingAt(3));
+  }
+  KeptPlans plans;
+  plans.KeepIn(folder);
+  ASSERT_EQ(plans.Of(10).size(), 2u);
+  EXPECT_EQ(*plans.Of(10)[0], MotionEndingAt(2));
+  EXPECT_EQ(*plans.Of(10)[1], MotionEndingAt(3));
+  // The configuration goes on: its next plan comes after those before.
+  plans.Put(10, MotionEndingAt(4));
+  KeptPlans again;
+  again.KeepIn(folder);
+  ASSERT_EQ(again.Of(10).size(), 3u);
+  EXPECT_EQ(*again.Of(10)[2], MotionEndingAt(4));
+  EXPECT_EQ(again.Of(9).size(), 1u);
+}
+
+TEST(KeptPlans, AFileThatWasTornIsNoMotion) {
+  const test::ScratchFolder scratch;
+  const std::string folder = scratch / "db.plans";
+  KeptPlans plans;
+  plans.KeepIn(folder);
+  plans.Put(3, MotionEndingAt(1));
+  std::filesystem::resize_file(folder + "/3.1.motion", 15);
+  std::ofstream(folder + "/notes.txt") << "not of this program";
+  KeptPlans after;
+  after.KeepIn(folder);
+  EXPECT_TRUE(after.Of(3).empty());
+  EXPECT_TRUE(std::filesystem::exists(folder + "/notes.txt"));
+}
+
+TEST(KeptPlans, FilesGoWithTheirPlans) {
+  const test::ScratchFolder scratch;
+  const std::string folder = scratch / "db.plans";
+  KeptPlans plans(40);
+  plans.KeepIn(folder);
+  for (std::uint64_t id = 1; id <= 4; ++id) plans.Put(id, MotionEndingAt(1));
+  EXPECT_FALSE(std::filesystem::exists(folder + "/2.1.motion"));
+  EXPECT_TRUE(std::filesystem::exists(folder + "/3.1.motion"));
+  KeptPlans smaller(20);
+  smaller.KeepIn(folder);
+  EXPECT_TRUE(smaller.Of(3).empty());
+  EXPECT_EQ(smaller.Of(4).size(), 1u);
+}
+
+TEST(KeptPlans, WithoutADiskTheyAreInMemory) {
+  KeptPlans plans;
+  plans.KeepIn("/proc/no/such/folder");
+  plans.Put(1, MotionEndingAt(1));
+  EXPECT_EQ(plans.Of(1).size(), 1u);
 }
 
 }  // namespace
