@@ -3,6 +3,8 @@
 #include <string>
 #include <utility>
 
+#include "daemon/campaign/campaign_files.h"
+#include "daemon/campaign/recorded_campaign.h"
 #include "daemon/control/messages.h"
 
 namespace focalfleet {
@@ -15,8 +17,37 @@ HttpAnswer RefusalOf(const Error& error) {
   return HttpFailure(status, CodeName(error.code), error.text);
 }
 
-Result<DiagnosisJob::Campaign> CampaignIn(const HttpRequest& request, const Caller& caller) {
+/// A tenth of the minutes of a diagnosis; some 50 MB while the tables are made.
+constexpr std::size_t kRecordedRowsMax = 200'000;
+constexpr std::uint32_t kRecordedConfigurationsMax = 5000;
+
+/// The tables of configurations that the store has: {"name", "recorded": {"first", "last"}}.
+Result<DiagnosisJob::Campaign> CampaignOfStore(const Json& args, const Recordings& recordings,
+                                               const Caller& caller) {
+  RecordedList list;
+  FOCALFLEET_TRY_ASSIGN(list.name, TextArgument(args, "name"));
+  const Json& range = args["recorded"];
+  if (!range.is_object()) return Fail(ErrorCode::kInvalid, "recorded must be an object");
+  FOCALFLEET_TRY_ASSIGN(list.first, UnsignedArgument(range, "first"));
+  FOCALFLEET_TRY_ASSIGN(list.last, UnsignedArgument(range, "last"));
+  if (list.first == 0 || list.last < list.first ||
+      list.last - list.first >= kRecordedConfigurationsMax)
+    return Fail(ErrorCode::kInvalid, "first and last must be the numbers of at most " +
+                                         std::to_string(kRecordedConfigurationsMax) +
+                                         " configurations");
+  FOCALFLEET_TRY_ASSIGN(const auto reader, StoreReader::Open(recordings.store));
+  FOCALFLEET_TRY_ASSIGN(const sim::Campaign campaign,
+                        RecordedCampaign(reader.get(), *recordings.layout, list, kRecordedRowsMax));
+  return DiagnosisJob::Campaign{.name = list.name,
+                                .moves_csv = WriteMoves(campaign),
+                                .units_csv = WriteCampaignUnits(campaign),
+                                .by = NameOf(caller)};
+}
+
+Result<DiagnosisJob::Campaign> CampaignIn(const HttpRequest& request, const Recordings& recordings,
+                                          const Caller& caller) {
   FOCALFLEET_TRY_ASSIGN(const Json args, DecodeObject(request.body));
+  if (args.contains("recorded")) return CampaignOfStore(args, recordings, caller);
   DiagnosisJob::Campaign campaign{
       .name = {}, .moves_csv = {}, .units_csv = {}, .by = NameOf(caller)};
   FOCALFLEET_TRY_ASSIGN(campaign.name, TextArgument(args, "name"));
@@ -25,13 +56,33 @@ Result<DiagnosisJob::Campaign> CampaignIn(const HttpRequest& request, const Call
   return campaign;
 }
 
+HttpAnswer ShowRecordings(const Recordings& recordings) {
+  const auto reader = StoreReader::Open(recordings.store);
+  if (!reader) return RefusalOf(reader.error());
+  const auto lists = RecordedLists(reader->get(), kRecordedConfigurationsMax);
+  if (!lists) return RefusalOf(lists.error());
+  Json all = Json::array();
+  for (const RecordedList& list : *lists)
+    all.push_back({{"name", list.name},
+                   {"night", list.is_night},
+                   {"first", list.first},
+                   {"last", list.last},
+                   {"configurations", list.configurations},
+                   {"began_ms", list.began.ns / 1'000'000}});
+  return {.content_type = "application/json",
+          .body = Json({{"recordings", std::move(all)}})
+                      .dump(-1, ' ', false, Json::error_handler_t::replace) +
+                  "\n"};
+}
+
 HttpAnswer ShowDiagnosis(DiagnosisJob* job) {
   return {.content_type = "application/json",
           .body = job->Show().dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"};
 }
 
-HttpAnswer BeginDiagnosis(DiagnosisJob* job, const HttpRequest& request, const Caller& caller) {
-  const auto campaign = CampaignIn(request, caller);
+HttpAnswer BeginDiagnosis(DiagnosisJob* job, const Recordings& recordings,
+                          const HttpRequest& request, const Caller& caller) {
+  const auto campaign = CampaignIn(request, recordings, caller);
   if (!campaign) return RefusalOf(campaign.error());
   if (const Status begun = job->Begin(*campaign); !begun) return RefusalOf(begun.error());
   return ShowDiagnosis(job);
@@ -64,15 +115,20 @@ HttpAnswer ReportAnswer(DiagnosisJob* job, const ReportRoute& route) {
 
 }  // namespace
 
-void AddDiagnosisRoutes(DiagnosisJob* job, HttpRouter* router) {
+void AddDiagnosisRoutes(DiagnosisJob* job, const Recordings& recordings, HttpRouter* router) {
   router->Add({.path = "/diagnosis",
                .verb = "status",
                .answer = [job](const HttpRequest&, const Caller&) { return ShowDiagnosis(job); }});
   router->Add({.method = "POST",
                .path = "/diagnosis",
                .verb = "diagnose",
-               .answer = [job](const HttpRequest& request, const Caller& caller) {
-                 return BeginDiagnosis(job, request, caller);
+               .answer = [job, recordings](const HttpRequest& request, const Caller& caller) {
+                 return BeginDiagnosis(job, recordings, request, caller);
+               }});
+  router->Add({.path = "/recordings",
+               .verb = "history",
+               .answer = [recordings](const HttpRequest&, const Caller&) {
+                 return ShowRecordings(recordings);
                }});
   router->Add(
       {.method = "POST",

@@ -91,7 +91,7 @@ void AddPageRoutes(const PageParts& parts, HttpRouter* router) {
                .answer = [plans = parts.plans](const HttpRequest& request, const Caller&) {
                  return MotionOfPreview(*plans, request);
                }});
-  AddDiagnosisRoutes(parts.diagnosis, router);
+  AddDiagnosisRoutes(parts.diagnosis, {parts.store, parts.layout}, router);
   router->Add({.path = "/curves",
                .verb = "status",
                .answer = [night = parts.night](const HttpRequest& request, const Caller&) {

@@ -4,6 +4,8 @@
 // Everything else that the page does goes through the verbs of /api (http/api_routes.h).
 #pragma once
 
+#include <string>
+
 #include "daemon/http/router.h"
 #include "daemon/page/diagnosis_job.h"
 #include "daemon/page/kept_plans.h"
@@ -20,6 +22,7 @@ struct PageParts {
   const KeptPlans* plans = nullptr;
   const NightCurves* night = nullptr;
   DiagnosisJob* diagnosis = nullptr;
+  std::string store;  // its file
 };
 
 void AddPageRoutes(const PageParts& parts, HttpRouter* router);

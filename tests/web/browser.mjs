@@ -46,6 +46,9 @@ export async function openTab(browser, options = {}) {
 }
 
 export async function signIn(tab, role) {
+  // The page asks by itself once it knows that the daemon wants a token.
+  await tab.waitForFunction(() => document.getElementById("token-dialog").open ||
+      (window.focalfleetPage && window.focalfleetPage.linkState !== "waiting"));
   if (!await tab.locator("#token-dialog").isVisible()) await tab.click("#sign-in");
   await tab.fill("#token", given.tokens[role]);
   await tab.click("#token-form button[type=submit]");

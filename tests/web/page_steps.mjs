@@ -3,6 +3,7 @@
 import {readFileSync} from "node:fs";
 import {assert, axeFindings, coloursOf, dropFile, given, isLive, openTab, signIn, textOf,
   withBrowser, world} from "./browser.mjs";
+import {heap} from "./heap_steps.mjs";
 import {past, study, tabs} from "./past_steps.mjs";
 import {tasks} from "./task_steps.mjs";
 
@@ -57,6 +58,11 @@ async function night(browser) {
   await tab.click("#apply");
   await textOf(tab, "#configuration", /night-1.csv is under way/);
   await textOf(tab, "#progress-text", /planned end|behind its plan|staging|planning/);
+  await tab.waitForFunction(() => {
+    const {plate} = window.focalfleetPage;
+    const moving = plate.state.indexOf(3);  // colours.js, State
+    return moving >= 0 && plate.ways.of(moving) !== null;
+  });
   await textOf(tab, "#configuration", /night-1.csv \(configuration 1\) is done/);
   await textOf(tab, "#configuration", `${given.count} units arrived`);
   const arrived = await tab.evaluate(() => window.focalfleetPage.fleet.outcome.every((o) => o === 2));
@@ -129,18 +135,35 @@ async function night(browser) {
 
 const kSizes = [["desktop", 1400, 900], ["tablet", 768, 1024], ["phone", 390, 844]];
 
+/** The plate drawn at once, and then in four bands over an image that was something else. */
+function pixelsThatBandsChange() {
+  const {far} = window.focalfleetPage.plate;
+  const {unitsOfBand} = far;
+  far.unitsOfBand = 1;
+  far.draw(far.wholeBand());
+  const whole = far.raster.pixels.slice();
+  far.raster.pixels.fill(0xFF00FF00);
+  for (let k = 0; k < 4; ++k) far.draw(far.nextBand());
+  far.unitsOfBand = unitsOfBand;
+  return far.raster.pixels.reduce((sum, pixel, k) => sum + (pixel !== whole[k]), 0);
+}
+
 async function looks(browser) {
   for (const colorScheme of ["light", "dark"]) {
     for (const [name, width, height] of kSizes) {
       const tab = await openTab(browser, {viewport: {width, height}, colorScheme});
       await signIn(tab, "operator");
       await isLive(tab);
-      await tab.waitForFunction(() => window.focalfleetPage.plate.times_ms.length > 2);
+      await tab.waitForFunction(() => {
+        const {plate} = window.focalfleetPage;
+        return plate.times_ms.length > 0 && !plate.isStale && !plate.isDirty && plate.bandsDue === 0;
+      });
       const colours = await coloursOf(tab);
       const [[background, empty]] = colours;
       const drawn = colours.reduce((sum, [, count]) => sum + count, 0) - empty;
       say(`${name} ${colorScheme}: ${drawn} pixels drawn on ${background.toString(16)}`);
       assert.ok(drawn > 5 * given.count, "each unit has pixels");
+      assert.equal(await tab.evaluate(pixelsThatBandsChange), 0, "bands are the whole");
       const stop = await tab.locator("#stop").boundingBox();
       assert.ok(stop.height >= 56 && stop.width >= 56 && stop.x >= 0 &&
         stop.y + stop.height <= height, `stop is in view: ${JSON.stringify(stop)}`);
@@ -205,7 +228,7 @@ async function closer(tab, colorScheme) {
   await tab.screenshot({path: `${given.out}/preview-${colorScheme}.png`});
 }
 
-const scenarios = {night, looks, past, study, tabs, tasks};
+const scenarios = {night, looks, past, study, tabs, tasks, heap};
 await withBrowser((browser) => scenarios[given.scenario](browser));
 say("done");
 process.exit(0);

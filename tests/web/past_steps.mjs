@@ -266,17 +266,30 @@ export async function study(browser) {
   await tab.click("#cancel-diagnosis");
   await textOf(tab, "#diagnosis", "it was cancelled");
 
-  say("the report: a verdict as a sentence, causes, gain");
+  say("the report: a verdict as a sentence, causes, gain, pictures");
   await chooseCampaign(tab);
-  await textOf(tab, "#diagnosis .verdict", /The causes below explain/);
-  await textOf(tab, "#diagnosis", "backlash");
-  await textOf(tab, "#diagnosis", /µm rms before/);
+  await textOf(tab, "#diagnosis-report .lead", /All units end 0\.1 deg late whenever they reverse: backlash/);
+  await textOf(tab, "#diagnosis-report .lead", /Nothing else is wrong\. With it in the model/);
+  await textOf(tab, "#diagnosis-report .card h3", /^backlash of theta/);
+  const pictures = await tab.locator("#diagnosis-report svg.plot").evaluateAll((all) =>
+    all.map((one) => [one.getAttribute("aria-label"), one.getBoundingClientRect().height]));
+  for (const wanted of [/^rms of each unit before/, /^move \d+ before/, /^theta against theta step/,
+    /^periods a turn of theta/])
+    assert.ok(pictures.some(([label, height]) => wanted.test(label) && height > 100), `${wanted}: ${pictures}`);
   assert.ok(await tab.getByRole("button", {name: "Load the model"}).isDisabled(), "an engineer may");
   assert.deepEqual(await axeFindings(tab), []);
   await tab.screenshot({path: `${given.out}/diagnosis.png`});
   const [download] = await Promise.all([tab.waitForEvent("download"),
     tab.getByRole("button", {name: "Keep the report"}).click()]);
   assert.match(readFileSync(await download.path(), "utf8"), /<!DOCTYPE html>/i);
+
+  say("what the daemon measured itself is diagnosed, too");
+  await textOf(tab, "#recordings", /Night of \d{4}-\d\d-\d\d: 1 configuration from 1 on/);
+  await tab.click("#diagnose-recording");
+  await textOf(tab, "#diagnosis", /Night of .* by operator-page/);
+  await textOf(tab, "#diagnosis-report .lead", /These data are not enough for a verdict/);
+  await chooseCampaign(tab);
+  await textOf(tab, "#diagnosis-report .card h3", /^backlash of theta/);
 
   say("an engineer loads the model, and rolls back");
   await signIn(tab, "engineer");

@@ -1,21 +1,12 @@
 // A diagnosis: a campaign is given, the daemon has it diagnosed in a process of its own, and its
-// report is shown here. The verdict comes first, as a sentence.
+// report is shown here, as report.html has it.
 
-import {clock, duration, find, make, setText} from "/page/dom.js";
+import {clock, counted, duration, find, make, setText} from "/page/dom.js";
 
 const kBytesMax = 15 << 20;  // of a request
 const kPeriod_ms = 2000;
-
-const kVerdicts = {
-  consistent: "The simulation is right within the noise: nothing is to be corrected.",
-  explained: "The causes below explain what the simulation gets wrong.",
-  ambiguous: "The causes below explain it, but others would do as well: see their rivals.",
-  unknown: "The simulation is wrong in a way that no known cause explains in full.",
-  insufficient: "The campaign is not enough for a verdict.",
-};
-
-const number = (value, digits = 3) => value === null || value === undefined ? "–"
-  : Number(value.toPrecision(digits)).toLocaleString("en");
+const kHalfDay_ms = 43_200_000;
+const kRecordingsShown = 40;
 
 export class Diagnosis {
   constructor(api, access, isShown, onModel) {
@@ -44,13 +35,42 @@ export class Diagnosis {
       return this.say("These files are larger than 15 MB: use focalfleet diagnose at the host.");
     const folder = moves.webkitRelativePath?.split("/").at(-2);
     const name = (folder || moves.name.replace(/-?moves\.csv$/, "") || "campaign").slice(0, 80);
+    await this.ask({name, moves_csv: await moves.text(), units_csv: await units.text()});
+  }
+
+  /** What the daemon's store has: the moves of a list, or the configurations of a night. */
+  async showRecordings() {
+    const body = find("recordings");
+    try {
+      const {recordings} = await this.api.get("/recordings");
+      if (recordings.length === 0) return body.replaceChildren();
+      const nameOf = ({name, night, began_ms}) => night
+        ? `Night of ${new Date(began_ms - kHalfDay_ms).toISOString().slice(0, 10)}` : name;
+      const select = make("select", {"aria-label": "A campaign of the daemon"},
+          ...recordings.slice(0, kRecordingsShown).map((one, k) => make("option", {value: k},
+              `${nameOf(one)}: ${counted(one.configurations, "configuration")} from ${one.first} on`)));
+      body.replaceChildren(this.access.guard(make("button", {type: "button", id: "diagnose-recording",
+        onclick: () => {
+          const {first, last} = recordings[select.value];
+          this.ask({name: nameOf(recordings[select.value]).slice(0, 80), recorded: {first, last}});
+        }}, "Diagnose what the daemon measured"), "diagnose"), select);
+    } catch (error) {
+      body.replaceChildren(make("span", {class: "hint"}, `Not known: ${error.message}.`));
+    }
+  }
+
+  async ask(campaign) {
     this.say("");
     try {
-      this.showState(await this.api.post("/diagnosis",
-          {name, moves_csv: await moves.text(), units_csv: await units.text()}));
+      this.showState(await this.api.post("/diagnosis", campaign));
     } catch (error) {
       this.say(`Not begun: ${error.message}.`);
     }
+  }
+
+  /** The sheet comes into view. */
+  async open() {
+    await Promise.all([this.show(), this.showRecordings()]);
   }
 
   async show() {
@@ -65,6 +85,10 @@ export class Diagnosis {
   async showState(now) {
     this.state = now.state;
     const body = find("diagnosis");
+    if (now.state !== "done") {
+      this.reportOf = "";
+      find("diagnosis-report").replaceChildren();
+    }
     if (now.state === "none") return body.replaceChildren(make("p", {class: "hint"}, "There was none yet."));
     const what = make("p", {}, make("b", {}, now.name), ` by ${now.by}, begun ` +
         `${clock(new Date(now.began_ms).toISOString())} UTC: `);
@@ -84,43 +108,26 @@ export class Diagnosis {
     }
     what.append(`it took ${duration(now.took_s)}.`);
     const key = `${now.name} ${now.began_ms} ${this.access.role}`;
-    if (key === this.reportOf && body.childElementCount > 0) return;
+    if (key === this.reportOf && body.childElementCount > 1) return;
     this.reportOf = key;
-    body.replaceChildren(what, ...this.reportParts(await this.api.get("/diagnosis-report")));
+    const [report, page] = await Promise.all([this.api.get("/diagnosis-report"),
+      this.api.bytes("/diagnosis-page")]);
+    body.replaceChildren(what, make("p", {class: "buttons"},
+        make("button", {type: "button", onclick: () => this.keep("/diagnosis-page", "report.html")},
+            "Keep the report"),
+        make("button", {type: "button", onclick: () => this.keep("/diagnosis-model", "model.toml")},
+            "Keep the model"),
+        this.access.guard(make("button", {type: "button", onclick: () => this.load(report)},
+            "Load the model"), "model_load")));
+    find("diagnosis-report").replaceChildren(...this.partsOf(new TextDecoder().decode(page)));
   }
 
-  reportParts(report) {
-    const {causes, gain, unknown, data} = report;
-    const verdict = kVerdicts[report.verdict] ?? `Verdict: ${report.verdict.replaceAll("_", " ")}.`;
-    const rows = causes.map((cause) => make("tr", {}, make("td", {}, cause.cause.replaceAll("_", " ")),
-        ...[cause.axis || "–", cause.scope,
-          `${number(cause.amplitude)} ${cause.amplitude_unit ?? ""}`, `${number(cause.rms_um)} µm`,
-          (cause.candidates ?? []).filter((name) => name !== cause.cause).join(", ").replaceAll("_", " ")
-            || "–"].map((text) => make("td", {}, text))));
-    return [make("p", {class: "verdict"}, report.missing ? `${verdict} ${report.missing}.` : verdict),
-      this.gainLine(gain),
-      ...(rows.length === 0 ? [] : [make("table", {class: "wide"}, make("thead", {}, make("tr", {},
-          ...["cause", "axis", "scope", "amplitude", "error it makes", "rivals"].map((text) =>
-            make("th", {scope: "col"}, text)))), make("tbody", {}, ...rows))]),
-      ...(unknown.length === 0 ? [] : [make("p", {}, `${unknown.length} findings without a known cause; ` +
-          "the report has them.")]),
-      make("p", {class: "hint"}, `${data.rows.toLocaleString("en")} rows of ` +
-          `${data.units.toLocaleString("en")} units.`),
-      make("ul", {}, ...report.remarks.map((remark) => make("li", {class: "hint"}, remark))),
-      make("p", {class: "buttons"},
-          make("button", {type: "button", onclick: () => this.keep("/diagnosis-page", "report.html")},
-              "Keep the report"),
-          make("button", {type: "button", onclick: () => this.keep("/diagnosis-model", "model.toml")},
-              "Keep the model"),
-          this.access.guard(make("button", {type: "button", onclick: () => this.load(report)},
-              "Load the model"), "model_load"))];
-  }
-
-  gainLine(gain) {
-    const before = gain?.rms_before_um;
-    const after = gain?.rms_after_um;
-    return make("p", {}, before === null || before === undefined ? ""
-      : `On moves that no fit has seen: ${number(before)} µm rms before, ${number(after)} µm with the model.`);
+  /** What is inside the body of a report, but for its title. */
+  partsOf(html) {
+    const inside = html.slice(html.indexOf(">", html.indexOf("<body")) + 1, html.indexOf("</body>"));
+    const parsed = new DOMParser().parseFromString(inside, "text/html");
+    parsed.querySelector("h1")?.remove();
+    return parsed.body.childNodes;
   }
 
   /** A file of the report goes to the browser's downloads. */

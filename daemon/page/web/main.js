@@ -21,6 +21,7 @@ import {SharedStream} from "/page/shared_stream.js";
 import {Sheets} from "/page/sheets.js";
 import {Stop} from "/page/stop.js";
 import {UnitPanel} from "/page/unit.js";
+import {Ways} from "/page/ways.js";
 
 const kStale_ms = 2500;  // status comes each second at least
 const kLegend_ms = 500;
@@ -81,6 +82,7 @@ class Page {
   open(layout) {
     this.fleet = new Fleet(layout);
     this.plate = new Plate(find("plate"), this.fleet);
+    this.plate.ways = new Ways(this.api, this.plate);
     const showUnit = (id) => this.unit.showId(id);
     this.unit = new UnitPanel(this.api, this.plate, () => this.showScale(),
         (u) => this.player?.select(u));
@@ -119,7 +121,7 @@ class Page {
         () => this.sheets.show("model"));
     this.camera = new Camera(api, plate, showUnit);
     this.sheets = new Sheets({curves: () => this.curves.show(), nights: () => this.nights.show(),
-      model: () => this.model.show(), diagnosis: () => this.diagnosis.show(), camera: () => this.camera.show()});
+      model: () => this.model.show(), diagnosis: () => this.diagnosis.open(), camera: () => this.camera.show()});
   }
 
   /** The plate shows a film, or the live fleet again. */
@@ -219,6 +221,7 @@ class Page {
         counts.map(([name, count]) => `${count.toLocaleString("en")} ${name}`).join(", ") +
         (facts.store_failing ? ". The store fails: nothing new may move." : ""));
     this.configuration.note(facts);
+    this.plate.ways.note(facts);
     this.earlier.note(facts);
     this.alarms.note(facts.alarms);
     this.events.note(facts);

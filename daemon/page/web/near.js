@@ -20,6 +20,7 @@ export class Near {
     context.fillRect(0, 0, plate.view.width, plate.view.height);
     this.visible = visible;
     this.drawObstacles();
+    if (plate.view.pitch_px > 40 && plate.ways && !plate.film) this.drawWays(plate.ways);
     this.drawThetaArms();
     this.drawPhiArms();
     this.drawBases();
@@ -55,6 +56,24 @@ export class Near {
     context.lineWidth = 1;
     context.strokeStyle = colours.ink;
     context.stroke();
+  }
+
+  /** Where the fibres will go. */
+  drawWays(ways) {
+    const {context, plate} = this;
+    const {view, colours} = plate;
+    context.lineWidth = 1.2;
+    context.strokeStyle = colours.moving;
+    context.globalAlpha = 0.5;
+    this.paint("stroke", (u) => {
+      const way = plate.state[u] === State.moving ? ways.of(u) : null;
+      if (!way) return false;
+      context.moveTo(view.screenX(way[0]), view.screenY(way[1]));
+      for (let k = 2; k < way.length; k += 2)
+        context.lineTo(view.screenX(way[k]), view.screenY(way[k + 1]));
+      return true;
+    });
+    context.globalAlpha = 1;
   }
 
   drawThetaArms() {

@@ -1,24 +1,23 @@
-// Plate draws the focal plane. Where units are small it draws into an image of its own (raster.js),
+// Plate draws the focal plane. Where units are small it draws into an image of its own (far.js),
 // where they are large by the canvas (near.js). Between two frames of the daemon it turns arms
-// evenly, and so shows them a tenth of a second late.
+// (turning.js).
 
 import {readColours, stateOf} from "/page/colours.js";
+import {Far} from "/page/far.js";
 import {Near} from "/page/near.js";
-import {Raster} from "/page/raster.js";
+import {Turning} from "/page/turning.js";
 import {View} from "/page/view.js";
 
 const kNear_px = 26;        // a pitch from which on units are drawn as shapes
 const kReachOfClick_px = 14;
 const kFullCircle = 2 * Math.PI;
-const kTurnOfGap = 1.1;
-const kTurnMost_ms = 400;   // after a longer gap arms are shown where they are
+const kEverywhere = {low_mm: -Infinity, high_mm: Infinity};
 
-/** The shortest way from one angle to another. */
-function turnBetween(from, to) {
-  const turn = (to - from) % kFullCircle;
-  if (turn > Math.PI) return turn - kFullCircle;
-  return turn < -Math.PI ? turn + kFullCircle : turn;
-}
+// Sines of a turn in even steps of 0.1 mrad, a hundredth of a pixel at an arm of 100 px.
+const kSteps = 65536;
+const kStepsPerRadian = kSteps / kFullCircle;
+const kQuarter = kSteps / 4;
+const kSines = Float64Array.from({length: kSteps}, (_, k) => Math.sin(k / kStepsPerRadian));
 
 export class Plate {
   constructor(canvas, fleet) {
@@ -26,7 +25,7 @@ export class Plate {
     this.context = canvas.getContext("2d", {alpha: false});
     this.fleet = fleet;
     this.view = new View(fleet);
-    this.raster = new Raster();
+    this.far = new Far(this);
     this.near = new Near(this);
     const n = fleet.count;
     this.elbow_x = new Float64Array(n).fill(NaN);
@@ -36,23 +35,20 @@ export class Plate {
     this.state = new Uint8Array(n);
     this.index = new Uint8Array(n);  // of the theme's entry
     this.counts = [];
-    // Arms that turn: where they were shown when the last frame came.
-    this.fromTheta = new Float64Array(n);
-    this.fromPhi = new Float64Array(n);
-    this.turning = new Set();
-    this.turnedAt_ms = 0;
-    this.gaps_ms = [100];  // between the last frames
-    this.turn_ms = 100;
+    this.turning = new Turning(fleet);
+    this.placed = (u, theta, phi) => this.place(u, theta, phi);
     this.selected = -1;
     this.marked = [];  // units that a preview does not serve
+    this.ways = null;  // of the configuration under way
     this.film = null;  // shown in place of the live fleet
     this.isStale = true;
     this.times_ms = [];  // of drawing, the newest last
     this.isAsked = false;
+    this.bandsDue = 0;  // that have changed, and are not drawn yet
     this.recolour();
   }
 
-  /** Something has changed: the browser is asked for a moment to draw. At rest it is not. */
+  /** All is to be drawn: the browser is asked for a moment. At rest it is not. */
   set dirty(isDirty) {
     this.isDirty = isDirty;
     if (isDirty) this.ask();
@@ -64,13 +60,14 @@ export class Plate {
     requestAnimationFrame((now_ms) => {
       this.isAsked = false;
       this.drawIfDue(now_ms);
-      if (this.turning.size > 0) this.ask();
+      if (this.turning.size > 0 || this.bandsDue > 0) this.ask();
     });
   }
 
   setTheme(theme) {
     this.theme = theme;
     this.reindex();
+    this.dirty = true;
   }
 
   /** The style sheet has other colours now. */
@@ -79,6 +76,7 @@ export class Plate {
     this.dirty = true;
   }
 
+  /** Units have other states. Far away they are drawn with the next bands. */
   reindex() {
     this.counts = new Array(this.theme.entries.length).fill(0);
     for (let u = 0; u < this.fleet.count; ++u) {
@@ -86,7 +84,8 @@ export class Plate {
       this.index[u] = this.theme.indexOf(u);
       ++this.counts[this.index[u]];
     }
-    this.dirty = true;
+    this.bandsDue = this.far.bands;
+    this.ask();
   }
 
   /** Shows a film, or with null the live fleet again. */
@@ -100,63 +99,40 @@ export class Plate {
     const {theta, phi} = this.film;
     for (let u = 0; u < this.fleet.count; ++u) this.place(u, theta[u], phi[u]);
     this.reindex();
+    this.dirty = true;
   }
 
   // ---- motion
 
-  /** The shown angle of an axis at this instant. */
-  shown(from, to, share) {
-    return Number.isNaN(from) ? to : from + share * turnBetween(from, to);
-  }
-
-  share(now_ms) {
-    return Math.min(1, (now_ms - this.turnedAt_ms) / this.turn_ms);
-  }
-
-  /** A frame begins: arms that turn do so from where they are shown now. */
+  /** A frame begins. */
   beginFrame(now_ms) {
-    const share = this.share(now_ms);
-    const {fleet, fromTheta, fromPhi} = this;
-    for (const u of this.turning) {
-      fromTheta[u] = this.shown(fromTheta[u], fleet.theta[u], share);
-      fromPhi[u] = this.shown(fromPhi[u], fleet.phi[u], share);
-    }
-    const gap_ms = now_ms - this.turnedAt_ms;
-    // Frames come unevenly: arms that arrive at the mean gap would stand and jump.
-    if (gap_ms <= kTurnMost_ms) this.gaps_ms = [...this.gaps_ms.slice(-4), gap_ms];
-    this.turn_ms = gap_ms > kTurnMost_ms ? 1 : kTurnOfGap * Math.max(...this.gaps_ms);
-    this.before = this.turning;
-    this.turning = new Set();
-    this.turnedAt_ms = now_ms;
+    this.turning.begin(now_ms);
   }
 
   /** The frame turns the unit; its old angles are still there. */
   noteTurn(u) {
-    if (!this.before.has(u)) {
-      this.fromTheta[u] = this.fleet.theta[u];
-      this.fromPhi[u] = this.fleet.phi[u];
-    }
-    this.before.delete(u);
-    this.turning.add(u);
+    this.turning.note(u);
   }
 
-  /** The frame is read: units that no longer turn are where it has them. */
+  /** The frame is read. */
   endFrame() {
-    if (this.film) {  // the live fleet goes on unseen
-      this.before = null;
-      return this.turning.clear();
-    }
-    for (const u of this.before) this.place(u, this.fleet.theta[u], this.fleet.phi[u]);
-    if (this.before.size + this.turning.size > 0) this.dirty = true;
-    this.before = null;
+    this.turning.end();
+    if (this.film) return this.turning.clear();  // the live fleet goes on unseen
+    if (this.turning.size > 0) this.ask();
   }
 
   place(u, theta, phi) {
     const {fleet} = this;
-    this.elbow_x[u] = fleet.x_mm[u] + fleet.arm_theta_mm[u] * Math.cos(theta);
-    this.elbow_y[u] = fleet.y_mm[u] + fleet.arm_theta_mm[u] * Math.sin(theta);
-    this.fibre_x[u] = this.elbow_x[u] + fleet.arm_phi_mm[u] * Math.cos(theta + phi);
-    this.fibre_y[u] = this.elbow_y[u] + fleet.arm_phi_mm[u] * Math.sin(theta + phi);
+    if (Number.isNaN(theta + phi)) {
+      this.elbow_x[u] = this.elbow_y[u] = this.fibre_x[u] = this.fibre_y[u] = NaN;
+      return;
+    }
+    const along = Math.round(theta * kStepsPerRadian) & (kSteps - 1);
+    const both = Math.round((theta + phi) * kStepsPerRadian) & (kSteps - 1);
+    this.elbow_x[u] = fleet.x_mm[u] + fleet.arm_theta_mm[u] * kSines[(along + kQuarter) & (kSteps - 1)];
+    this.elbow_y[u] = fleet.y_mm[u] + fleet.arm_theta_mm[u] * kSines[along];
+    this.fibre_x[u] = this.elbow_x[u] + fleet.arm_phi_mm[u] * kSines[(both + kQuarter) & (kSteps - 1)];
+    this.fibre_y[u] = this.elbow_y[u] + fleet.arm_phi_mm[u] * kSines[both];
   }
 
   /** A snapshot came: units that do not turn are where it has them. */
@@ -174,17 +150,6 @@ export class Plate {
     const places = [];
     for (let u = 0; u < count; ++u) if (error_um[u] > 0) places.push(u);
     return places.sort((a, b) => error_um[b] - error_um[a]).slice(0, most);
-  }
-
-  turn(now_ms) {
-    if (this.turning.size === 0) return;
-    const share = this.share(now_ms);
-    const {fleet, fromTheta, fromPhi} = this;
-    for (const u of this.turning)
-      this.place(u, this.shown(fromTheta[u], fleet.theta[u], share),
-          this.shown(fromPhi[u], fleet.phi[u], share));
-    if (share >= 1) this.turning.clear();
-    this.dirty = true;
   }
 
   targetOf(u) {
@@ -215,14 +180,19 @@ export class Plate {
   /** Draws where something has changed. */
   drawIfDue(now_ms) {
     const begun = performance.now();
-    this.turn(now_ms);
-    if (!this.isDirty || !this.theme) return;
+    const turns = this.turning.size > 0;
+    if ((!this.isDirty && !turns && this.bandsDue === 0) || !this.theme) return;
+    const isFar = this.view.pitch_px < kNear_px;
+    const isWhole = this.isDirty || !isFar;
+    const band = isWhole ? this.far.wholeBand() : this.far.nextBand();
+    this.turning.show(now_ms, isWhole ? kEverywhere : band, this.placed);
     this.dirty = false;
-    if (this.view.pitch_px < kNear_px) this.drawFar();
+    this.bandsDue = isWhole ? 0 : Math.max(0, this.bandsDue - 1);
+    // Beside a border an arm may have been drawn for two instants.
+    if (turns && this.turning.size === 0 && !isWhole) this.bandsDue = this.far.bands;
+    if (isFar) this.far.draw(band);
     else this.near.draw(this.view.visible());
-    this.context.setTransform(this.view.ratio, 0, 0, this.view.ratio, 0, 0);
-    this.drawMarks();
-    if (this.isStale && !this.film) this.drawHatch();
+    this.drawOver(band);
     const took_ms = performance.now() - begun;
     performance.measure("plate", {start: begun, duration: took_ms});
     performance.clearMeasures("plate");
@@ -230,35 +200,18 @@ export class Plate {
     if (this.times_ms.length > 1200) this.times_ms.splice(0, 600);
   }
 
-  drawFar() {
-    const {raster, view, fleet, colours: {of32}, theme} = this;
-    raster.resize(this.canvas.width, this.canvas.height);
-    raster.clear(of32.plate);
-    const scale = view.scale * view.ratio;
-    const left = view.plateX(0);
-    const top = view.plateY(0);
-    for (const {x_mm, y_mm, radius_mm} of fleet.obstacles)
-      raster.dot((x_mm - left) * scale, (top - y_mm) * scale,
-          Math.max(2, 0.8 * radius_mm * scale), of32.obstacle);
-    const table = theme.entries.map(({colour}) => of32[colour]);
-    const wide = Math.max(1.8, 2 * fleet.half_width_mm[0] * scale);
-    const thin = Math.max(0.7, 0.3 * wide);
-    const dot = Math.max(1, 0.09 * fleet.pitch_mm * scale);
-    for (let u = 0; u < fleet.count; ++u) {
-      const x = (fleet.x_mm[u] - left) * scale;
-      const y = (top - fleet.y_mm[u]) * scale;
-      if (Number.isNaN(this.fibre_x[u])) {  // a place that is not known has no arms
-        raster.dot(x, y, 1.6 * dot, table[this.index[u]]);
-        continue;
-      }
-      const elbow_x = (this.elbow_x[u] - left) * scale;
-      const elbow_y = (top - this.elbow_y[u]) * scale;
-      raster.line(x, y, elbow_x, elbow_y, thin, of32.link);
-      raster.line(elbow_x, elbow_y, (this.fibre_x[u] - left) * scale,
-          (top - this.fibre_y[u]) * scale, wide, table[this.index[u]]);
-      if (this.state[u] > 3) raster.dot(x, y, 1.2 * dot, table[this.index[u]]);
-    }
-    this.context.putImageData(raster.image, 0, 0);
+  /** What lies over the units, in the rows that were drawn. */
+  drawOver({top, bottom}) {
+    const {context, view} = this;
+    context.save();
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.beginPath();
+    context.rect(0, top, this.canvas.width, bottom - top);
+    context.clip();
+    context.setTransform(view.ratio, 0, 0, view.ratio, 0, 0);
+    this.drawMarks();
+    if (this.isStale && !this.film) this.drawHatch();
+    context.restore();
   }
 
   drawMarks() {

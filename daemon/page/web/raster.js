@@ -6,6 +6,8 @@ export class Raster {
   constructor() {
     this.width = 0;
     this.height = 0;
+    this.top = 0;  // rows outside are left as they are
+    this.bottom = 0;
   }
 
   resize(width, height) {
@@ -16,8 +18,14 @@ export class Raster {
     this.pixels = new Uint32Array(this.image.data.buffer);
   }
 
+  /** Draws into the rows `top` .. `bottom` - 1 alone. */
+  clip(top, bottom) {
+    this.top = Math.max(0, top);
+    this.bottom = Math.min(this.height, bottom);
+  }
+
   clear(colour) {
-    this.pixels.fill(colour);
+    this.pixels.fill(colour, this.top * this.width, this.bottom * this.width);
   }
 
   /** Covers a pixel by a share of 0 to 256. */
@@ -48,9 +56,11 @@ export class Raster {
     const across0 = steep ? (forward ? x0 : x1) : (forward ? y0 : y1);
     const across1 = steep ? (forward ? x1 : x0) : (forward ? y1 : y0);
     const slope = (across1 - across0) / (end - begin);
-    const limit = steep ? this.height : this.width;
-    const limitAcross = steep ? this.width : this.height;
-    const first = Math.max(0, Math.floor(begin));
+    const limit = steep ? this.bottom : this.width;
+    const limitAcross = steep ? this.width : this.bottom;
+    const least = steep ? this.top : 0;
+    const leastAcross = steep ? 0 : this.top;
+    const first = Math.max(least, Math.floor(begin));
     const last = Math.min(limit - 1, Math.floor(end));
     const stride = steep ? 1 : this.width;  // across the line
     const along = steep ? this.width : 1;
@@ -59,7 +69,7 @@ export class Raster {
       const middle = across0 + (p + 0.5 - begin) * slope;
       const low = middle - half;
       const high = middle + half;
-      let q = Math.max(0, Math.floor(low));
+      let q = Math.max(leastAcross, Math.floor(low));
       const stop = Math.min(limitAcross, high);
       for (; q < stop; ++q) {
         const share = Math.min(q + 1, high) - Math.max(q, low);
@@ -72,8 +82,8 @@ export class Raster {
   dot(x, y, half, colour) {
     const left = Math.max(0, Math.round(x - half));
     const right = Math.min(this.width, Math.round(x + half));
-    const top = Math.max(0, Math.round(y - half));
-    const bottom = Math.min(this.height, Math.round(y + half));
+    const top = Math.max(this.top, Math.round(y - half));
+    const bottom = Math.min(this.bottom, Math.round(y + half));
     for (let row = top; row < bottom; ++row)
       for (let column = left; column < right; ++column)
         this.pixels[row * this.width + column] = colour;

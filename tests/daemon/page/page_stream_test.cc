@@ -92,7 +92,8 @@ class PageStreamTest : public ::testing::Test {
         .tokens =
             std::make_shared<TokenRegister>(TokenRegister::Options{.path = folder_ / "tokens.csv"}),
         .viewer_without_token = viewer_without_token});
-    AddPageRoutes({&layout_, &feed_, &plans_, &night_, &diagnosis_}, router.get());
+    AddPageRoutes({&layout_, &feed_, &plans_, &night_, &diagnosis_, folder_ / "none.db"},
+                  router.get());
     server_ = std::make_unique<HttpServer>(
         HttpServer::Options{.address = "127.0.0.1", .router = std::move(router), .limits = limits});
     ASSERT_TRUE(WaitUntil([&] { return server_->port() != 0; }, kPatienceMs));
