@@ -17,7 +17,7 @@ HttpAnswer RefusalOf(const Error& error) {
   return HttpFailure(status, CodeName(error.code), error.text);
 }
 
-/// A tenth of the minutes of a diagnosis; some 50 MB while the tables are made.
+/// A bound on the memory that the tables take; a diagnosis searches fewer rows than that.
 constexpr std::size_t kRecordedRowsMax = 200'000;
 constexpr std::uint32_t kRecordedConfigurationsMax = 5000;
 
