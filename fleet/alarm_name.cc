@@ -61,6 +61,10 @@ constexpr AlarmKind kKinds[] = {
     {kRunUpsLeftOut, "RunUpsLeftOut", kInfo, kNote},
     {kUnitHeldBack, "UnitHeldBack", kInfo, kNote},
     {kUnitRetargeted, "UnitRetargeted", kInfo, kNote},
+    {kPlaneSilent, "PlaneSilent", kError, kOfHost},
+    {kPlaneHeard, "PlaneHeard", kInfo, kNote},
+    {kSectorSilent, "SectorSilent", kError, kEvent},
+    {kSectorStartMissed, "SectorStartMissed", kWarning, kEvent},
 };
 
 constexpr bool InOrder() {

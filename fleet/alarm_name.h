@@ -72,8 +72,13 @@ enum class AlarmName : std::uint8_t {
   kRunUpsLeftOut,
   kUnitHeldBack,
   kUnitRetargeted,
+  // a sector of a plane
+  kPlaneSilent,
+  kPlaneHeard,
+  kSectorSilent,
+  kSectorStartMissed,
 };
-inline constexpr AlarmName kLastAlarmName = AlarmName::kUnitRetargeted;
+inline constexpr AlarmName kLastAlarmName = AlarmName::kSectorStartMissed;
 inline constexpr std::size_t kAlarmNameCount = static_cast<std::size_t>(kLastAlarmName) + 1;
 
 /// When an open alarm is over.

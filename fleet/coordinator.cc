@@ -66,7 +66,17 @@ class Coordinator::Impl {
   const UnitTable& units() const { return units_; }
   UnitTable& units() { return units_; }
   const CoordinatorConfig& config() const { return config_; }
-  const ConfigurationExecutor& executor() const { return executor_; }
+  ConfigurationExecutor& executor() { return executor_; }
+
+  /// Errors: kRefused where a command of a plane comes to a daemon of its own, or an operator's to
+  /// a sector of a plane.
+  [[nodiscard]] Status OfPlane(bool by_plane) const {
+    if (by_plane == config_.in_plane) return {};
+    return Fail(ErrorCode::kRefused, by_plane
+                                         ? "this daemon is no sector of a plane"
+                                         : "this daemon is one sector of a plane: its units move "
+                                           "by the plane's coordinator, command that");
+  }
 
  private:
   void BeginStep(HostInstant now, std::uint64_t committed_through, bool store_failing,
@@ -119,12 +129,22 @@ class Coordinator::Impl {
     }  // other commands go on, and are answered when they are over
   }
 
-  Status Do(std::uint64_t request, const ApplyCommand& c) { return executor_.Apply(request, c); }
+  Status Do(std::uint64_t request, const ApplyCommand& c) {
+    FOCALFLEET_TRY(OfPlane(false));
+    return executor_.Apply(request, c);
+  }
   Status Do(std::uint64_t request, const RetargetCommand& c) {
+    FOCALFLEET_TRY(OfPlane(false));
     return executor_.Retarget(request, c);
   }
-  Status Do(std::uint64_t request, const HomeCommand& c) { return executor_.Home(request, c); }
-  Status Do(std::uint64_t request, const MeasureCommand&) { return executor_.Measure(request); }
+  Status Do(std::uint64_t request, const HomeCommand& c) {
+    FOCALFLEET_TRY(OfPlane(false));
+    return executor_.Home(request, c);
+  }
+  Status Do(std::uint64_t request, const MeasureCommand&) {
+    FOCALFLEET_TRY(OfPlane(false));
+    return executor_.Measure(request);
+  }
   Status Do(std::uint64_t, const StopCommand& c) {
     if (c.unit) {
       executor_.StopUnit(*c.unit);
@@ -148,6 +168,17 @@ class Coordinator::Impl {
   Status Do(std::uint64_t request, const WriteParameterCommand& c) {
     if (executor_.busy()) return Fail(ErrorCode::kRefused, "a configuration is under way");
     return WriteParameter(fleet_, request, c);
+  }
+
+  Status Do(std::uint64_t request, const SectorApplyCommand& c) {
+    FOCALFLEET_TRY(OfPlane(true));
+    return executor_.Apply(request, c.apply);
+  }
+  /// The other commands of a plane.
+  template <class OfRound>
+  Status Do(std::uint64_t, const OfRound& c) {
+    FOCALFLEET_TRY(OfPlane(true));
+    return executor_.sector_rounds().Do(c);
   }
 
   Status Do(std::uint64_t request, const KeepRowsCommand& c) {
@@ -180,6 +211,7 @@ void Effects::Clear() {
   replies.clear();
   sync_at.reset();
   changed.clear();
+  border_ends.clear();
   wake_at = kNever;
 }
 
@@ -193,6 +225,7 @@ void Coordinator::Step(const Inputs& inputs, Effects* effects) { impl_->Step(inp
 void Coordinator::End(HostInstant now, Effects* effects) { impl_->End(now, effects); }
 
 Result<Preview> Coordinator::PreviewOf(const ApplyCommand& command) const {
+  FOCALFLEET_TRY(impl_->OfPlane(false));
   return impl_->executor().PreviewOf(command);
 }
 
@@ -224,6 +257,7 @@ const BusView& Coordinator::bus(BusId bus) const {
 const ConfigurationView& Coordinator::configuration() const { return impl_->executor().view(); }
 std::span<const UnitDrive> Coordinator::drives() const { return impl_->units().drives; }
 const CoordinatorConfig& Coordinator::config() const { return impl_->config(); }
+SectorView Coordinator::sector() const { return impl_->executor().sector_rounds().View(); }
 bool Coordinator::busy() const { return impl_->executor().busy(); }
 
 }  // namespace focalfleet

@@ -30,6 +30,7 @@
 #include "fleet/coordinate/coordinator_config.h"
 #include "fleet/coordinate/effects.h"
 #include "fleet/coordinate/inputs.h"
+#include "fleet/coordinate/sector_round.h"
 #include "fleet/coordinate/unit_view.h"
 #include "fleet/layout.h"
 
@@ -72,6 +73,8 @@ class Coordinator {
   [[nodiscard]] const ConfigurationView& configuration() const;
   [[nodiscard]] std::span<const UnitDrive> drives() const;
   [[nodiscard]] const CoordinatorConfig& config() const;
+  /// How far a sector of a plane is with its round.
+  [[nodiscard]] SectorView sector() const;
   [[nodiscard]] bool busy() const;  // a configuration or homing is under way
 
  private:

@@ -24,6 +24,7 @@
 
 #include "protocol/base/ids.h"
 #include "protocol/base/result.h"
+#include "protocol/wire/staged_move.h"
 
 namespace focalfleet::journal {
 
@@ -203,6 +204,24 @@ struct Kind<std::string> {
     in->Take(text->data(), text->size());
   }
 };
+template <>
+struct Kind<AxisPath> {
+  static void Write(const AxisPath& path, std::string* out) {
+    WriteFields(path.size(), out);
+    for (const Segment& segment : path.segments()) WriteFields(segment, out);
+  }
+  static void Read(ByteReader* in, AxisPath* path) {
+    std::uint8_t size = 0;
+    ReadFields(in, &size);
+    in->good = in->good && size <= limits::kSegmentsPerAxis;
+    *path = {};
+    for (std::uint8_t n = 0; n < size && in->good; ++n) {
+      Segment segment;
+      ReadFields(in, &segment);
+      path->Append(segment);
+    }
+  }
+};
 template <class T, std::size_t N>
 struct Kind<std::array<T, N>> {
   static void Write(const std::array<T, N>& list, std::string* out) {
@@ -233,6 +252,21 @@ struct Kind<std::optional<T>> {
     bool there = false;
     ReadFields(in, &there);
     if (there) ReadFields(in, &value->emplace());
+  }
+};
+template <class T>
+struct Kind<std::shared_ptr<const T>> {
+  static void Write(const std::shared_ptr<const T>& value, std::string* out) {
+    WriteFields(value != nullptr, out);
+    if (value != nullptr) WriteFields(*value, out);
+  }
+  static void Read(ByteReader* in, std::shared_ptr<const T>* value) {
+    bool there = false;
+    ReadFields(in, &there);
+    if (!there) return value->reset();
+    T read{};
+    ReadFields(in, &read);
+    *value = std::make_shared<const T>(std::move(read));
   }
 };
 template <>

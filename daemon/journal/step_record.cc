@@ -68,11 +68,12 @@ EffectsDigest PartsOf(const Effects& effects) {
     WriteFields(plan.to_home, &job);
   }
   if (effects.exposure) WriteFields(*effects.exposure, &exposure);
-  return {.rows = DigestOfAll(effects.batch, effects.rows),
-          .frames = DigestOfAll(effects.frames),
-          .jobs = DigestOfAll(job, exposure),
-          .replies = DigestOfAll(effects.replies),
-          .rest = DigestOfAll(effects.sync_at, effects.changed, effects.wake_at)};
+  return {
+      .rows = DigestOfAll(effects.batch, effects.rows),
+      .frames = DigestOfAll(effects.frames),
+      .jobs = DigestOfAll(job, exposure),
+      .replies = DigestOfAll(effects.replies),
+      .rest = DigestOfAll(effects.sync_at, effects.changed, effects.border_ends, effects.wake_at)};
 }
 
 template <class T>

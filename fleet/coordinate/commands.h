@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "fleet/coordinate/sector_round.h"
 #include "fleet/drive.h"
 #include "fleet/records.h"
 #include "protocol/base/ids.h"
@@ -69,6 +70,10 @@ struct WriteParameterCommand {
   Parameter parameter = Parameter::kRepeat;
   std::int32_t value = 0;
 };
+/// In a sector of a plane: the plane's coordinator starts a configuration.
+struct SectorApplyCommand {
+  ApplyCommand apply;
+};
 /// Stores what the shell has changed already, and answers `text` when that is durable.
 struct KeepRowsCommand {
   std::vector<Row> rows;
@@ -77,7 +82,9 @@ struct KeepRowsCommand {
 struct Command {
   std::uint64_t request = 0;
   std::variant<ApplyCommand, RetargetCommand, StopCommand, HomeCommand, MeasureCommand,
-               EnableCommand, AdoptCommand, WriteParameterCommand, KeepRowsCommand>
+               EnableCommand, AdoptCommand, WriteParameterCommand, KeepRowsCommand,
+               SectorApplyCommand, SectorRound, SectorStartCommand, SectorWithdrawCommand,
+               BorderEndCommand>
       what;
 };
 

@@ -16,6 +16,7 @@ using enum UnitPhase;
 using Phase = ConfigurationPhase;
 
 constexpr DurationNs kGatherStep = Milliseconds(50);
+constexpr DurationNs kSettleMost = Seconds(180);
 
 /// The unit has not had the chance to answer, is being read, or is taking a parameter that plans
 /// depend on.
@@ -25,7 +26,26 @@ bool IsAwaited(const UnitRecord& unit) {
          !unit.request.waiting_writes.empty();
 }
 
+void SayWhatIsWaitedFor(ExecutorRooms* rooms) {
+  const Coordination& fleet = rooms->fleet;
+  Configuration& configuration = rooms->configuration;
+  const Phase phase = configuration.phase();
+  const bool needs_the_store = (phase == Phase::kGathering && !fleet.ledger.MovesAreReserved()) ||
+                               phase == Phase::kCommitting || phase == Phase::kHomeCommitting ||
+                               phase == Phase::kReporting;
+  configuration.view.waiting_for =
+      needs_the_store && fleet.ledger.store_failing() ? "the store, which cannot be written"
+      : phase == Phase::kMeasuring && rooms->measurement.IsAsked() ? "the camera"
+                                                                   : "";
+}
+
 }  // namespace
+
+bool IsHeld(const ExecutorRooms& rooms) {
+  return rooms.configuration.phase() == Phase::kCommitting &&
+         rooms.fleet.ledger.committed_through() >= rooms.round.commit_batch &&
+         rooms.round.count(Part::kHolding) == rooms.round.plan.moves.size();
+}
 
 void ConfigurationProgress::Begin(std::uint64_t request, const Goal& goal) {
   configuration_.Begin(request, goal);
@@ -46,7 +66,13 @@ void ConfigurationProgress::Gather() {
 
 void ConfigurationProgress::GatherIfDue() {
   const bool waiting = std::ranges::any_of(fleet_.units.all(), IsAwaited);
-  if ((waiting && fleet_.now() < gather_until_) || !fleet_.ledger.MovesAreReserved()) {
+  // In a plane others go on meanwhile: units that an earlier life of the daemon has sent off are
+  // waited for as long as they may move.
+  const bool settling = fleet_.config.in_plane && fleet_.now() < gather_until_ + kSettleMost &&
+                        std::ranges::any_of(fleet_.units.all(), [](const UnitRecord& unit) {
+                          return unit.view.phase == kSettling;
+                        });
+  if ((waiting && fleet_.now() < gather_until_) || settling || !fleet_.ledger.MovesAreReserved()) {
     configuration_.due = fleet_.now() + kGatherStep;
     return;
   }
@@ -60,7 +86,8 @@ void ConfigurationProgress::GatherIfDue() {
 
 void ConfigurationProgress::BeginRound() {
   ConfigurationView& view = configuration_.view;
-  if (view.round == limits::kRoundsPerConfiguration) {
+  // The plane bounds the rounds of its sectors.
+  if (view.round == limits::kRoundsPerConfiguration && !fleet_.config.in_plane) {
     configuration_.failure = "gave up after " + std::to_string(view.round) + " rounds";
     configuration_.EndWhenDurable(ConfigurationState::kDone);
     return;
@@ -94,6 +121,30 @@ void ConfigurationProgress::OnPlan(const PlanDone& done) {
   if (configuration_.view.round == 1) configuration_.ReplyLast(done.plan.error(), {});
   configuration_.outcomes.SetOfPending(TargetOutcome::kRefused, configuration_.failure);
   configuration_.EndWhenDurable(ConfigurationState::kFailed);
+}
+
+void ConfigurationProgress::TakeRound(const SectorRound& round) {
+  round_.border = {.follows = round.follows, .leads = {}, .finished = round.finished};
+  for (const SectorRound::LeadsBeyond& leads : round.leads)
+    round_.border.leads[leads.unit.value] = leads;
+  round_.skew_s = round.start_skew_s;
+  for (const SectorRound::Refused& refused : round.refused)
+    if (fleet_.units[refused.unit].view.outcome == TargetOutcome::kPending)
+      configuration_.outcomes.Set(refused.unit, TargetOutcome::kRefused, refused.reason);
+  if (!round.failure.empty()) configuration_.failure = round.failure;
+  PlanDone done{};
+  done.job = round.job;
+  done.plan = Plan{};
+  done.plan->moves = round.moves;
+  done.predicted = {round.makespan_s, round.energy_J, round.peak_power_W};
+  TakePlan(done);
+}
+
+void ConfigurationProgress::Withdraw() {
+  if (configuration_.phase() != Phase::kUploading && configuration_.phase() != Phase::kCommitting)
+    return;
+  TakeBackIntents(fleet_, &round_);
+  Disarm();
 }
 
 void ConfigurationProgress::TakePlan(const PlanDone& done) {
@@ -178,18 +229,7 @@ void ConfigurationProgress::Advance() {
     case Phase::kPlanning:
       break;
   }
-  SayWhatIsWaitedFor();
-}
-
-void ConfigurationProgress::SayWhatIsWaitedFor() {
-  const Phase phase = configuration_.phase();
-  const bool needs_the_store = (phase == Phase::kGathering && !fleet_.ledger.MovesAreReserved()) ||
-                               phase == Phase::kCommitting || phase == Phase::kHomeCommitting ||
-                               phase == Phase::kReporting;
-  configuration_.view.waiting_for =
-      needs_the_store && fleet_.ledger.store_failing() ? "the store, which cannot be written"
-      : phase == Phase::kMeasuring && rooms_.measurement.IsAsked() ? "the camera"
-                                                                   : "";
+  SayWhatIsWaitedFor(&rooms_);
 }
 
 void ConfigurationProgress::AdvanceUpload() {
@@ -225,16 +265,21 @@ void ConfigurationProgress::Disarm() {
 
 void ConfigurationProgress::AdvanceCommit() {
   if (fleet_.ledger.committed_through() < round_.commit_batch) return;
-  if (round_.count(Part::kHolding) == round_.plan.moves.size()) return Start();
+  if (IsHeld(rooms_)) {
+    const HostInstant start_at = round_.border.start_at;
+    if (!fleet_.config.in_plane) return Start(fleet_.now() + fleet_.config.start_delay);
+    if (start_at != kNever) return Start(start_at);
+    return;
+  }
   TakeBackIntents(fleet_, &round_);  // a unit failed while the store wrote
   Disarm();
 }
 
-void ConfigurationProgress::Start() {
+void ConfigurationProgress::Start(HostInstant at) {
   configuration_.view.state = ConfigurationState::kMoving;
   CountPrediction();
   configuration_.Record();
-  configuration_.due = rooms_.start.Begin();
+  configuration_.due = rooms_.start.Begin(at);
   configuration_.view.started = round_.started;
   configuration_.SetPhase(Phase::kMoving);
 }
@@ -307,6 +352,8 @@ void ConfigurationProgress::JudgeTargets() {
       // The unit stood there from the start, or waits and will be here until the next exposure.
       outcomes.NoteArrival({n}, rooms_.corrections.Waits({n}) ? round_.settled_batch : 0);
   }
+  // A sector asks its plane again, because others may need its units to make way.
+  if (fleet_.config.in_plane) again = !round_.border.finished;
   if (again || rooms_.corrections.BeginWave()) return Gather();
   rooms_.corrections.NoteUnitsWithoutRoom();
   MeasureOrEnd();

@@ -17,6 +17,9 @@
 
 namespace focalfleet {
 
+/// All units of the round hold their moves, and their intents are durable.
+[[nodiscard]] bool IsHeld(const ExecutorRooms& rooms);
+
 class ConfigurationProgress {
  public:
   /// `rooms` outlives this.
@@ -28,6 +31,10 @@ class ConfigurationProgress {
 
   void Begin(std::uint64_t request, const Goal& goal);
   void OnPlan(const PlanDone& done);
+  /// The part of a plane's plan that this sector carries out. Pre: it waits for it.
+  void TakeRound(const SectorRound& round);
+  /// A round that has not started is given back, and another plan is asked for.
+  void Withdraw();
   void OnExposure(const ExposureDone& done);
   /// Goes on as far as it can now.
   void Advance();
@@ -42,7 +49,7 @@ class ConfigurationProgress {
   void AdvanceUpload();
   void Disarm();
   void AdvanceCommit();
-  void Start();
+  void Start(HostInstant at);
   void StartHoming();
   void CountPrediction();
   [[nodiscard]] bool RoundIsOver() const;
@@ -52,7 +59,6 @@ class ConfigurationProgress {
   void MeasureOrEnd();
   void TakeMeasurement(ConfigurationMeasurement::Progress progress);
   void End();
-  void SayWhatIsWaitedFor();
 
   ExecutorRooms& rooms_;
   const Coordination& fleet_;     // of rooms_

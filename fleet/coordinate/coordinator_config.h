@@ -35,6 +35,7 @@ struct CoordinatorConfig {
   /// With a SYNC line an edge signals the common start. Start frames then name an instant
   /// `sync_lead` after it, for units that have no such line or miss the edge.
   bool sync_line = false;
+  bool in_plane = false;  // the daemon owns one sector of a plane (fleet/coordinate/sector_round.h)
   bool reads_sensors = false;  // of units that have some (units.csv, [hall] model)
   bool has_camera = false;     // else a configuration that asks for one is refused
   DurationNs sync_lead = Milliseconds(5);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "fleet/coordinate/sector_round.h"
 #include "fleet/knowledge.h"
 #include "fleet/measurement.h"
 #include "fleet/plan/planner.h"
@@ -78,6 +79,7 @@ struct Effects {
   std::vector<ReplyEffect> replies;
   std::optional<HostInstant> sync_at;    // an edge on the SYNC line is due then
   std::vector<PositionerIndex> changed;  // units whose status differs from the published one
+  std::vector<BorderEnd> border_ends;    // of a sector: for the sectors beyond its border
   HostInstant wake_at = kNever;
 
   void Clear();

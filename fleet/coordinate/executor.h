@@ -11,6 +11,7 @@
 #include "fleet/coordinate/configuration_progress.h"
 #include "fleet/coordinate/executor_rooms.h"
 #include "fleet/coordinate/preview.h"
+#include "fleet/coordinate/sector_rounds.h"
 
 namespace focalfleet {
 
@@ -36,6 +37,9 @@ class ConfigurationExecutor {
   void GiveUp();
 
   void OnPlan(const PlanDone& done) { progress_.OnPlan(done); }
+  /// Where the daemon owns a sector of a plane.
+  [[nodiscard]] SectorRounds sector_rounds() { return {&rooms_, &progress_}; }
+
   void OnExposure(const ExposureDone& done) { progress_.OnExposure(done); }
   void OnConfirm(PositionerIndex i, const ConfirmReply& reply);
   void OnArm(PositionerIndex i, const ArmReply& reply);

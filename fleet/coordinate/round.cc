@@ -71,6 +71,8 @@ void Round::End() {
   plan.moves.clear();
   late_.clear();
   running.reset();
+  border.follows.clear();
+  border.leads.clear();
   for (RoundUnit& unit : units_) unit.goes_on = 0;
 }
 
@@ -83,6 +85,7 @@ void Round::Clear() {
   plan = {};
   late_.clear();
   running.reset();
+  border = {};
 }
 
 }  // namespace focalfleet

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "fleet/coordinate/inputs.h"
+#include "fleet/coordinate/sector_round.h"
 #include "fleet/knowledge.h"
 #include "fleet/plan/plan.h"
 #include "fleet/plan/planner.h"
@@ -22,6 +23,14 @@ namespace focalfleet {
 /// Where a unit is in this round.
 enum class Part : std::uint8_t { kNone, kWaiting, kUploading, kHolding, kMoving };
 inline constexpr std::size_t kPartCount = 5;
+
+/// The plane's side of a round, where the daemon owns one sector of a plane.
+struct BorderRound {
+  std::vector<SectorRound::FollowsBeyond> follows;
+  std::unordered_map<std::uint32_t, SectorRound::LeadsBeyond> leads;  // by unit
+  bool finished = false;                                              // no round follows
+  HostInstant start_at = kNever;                                      // kNever: held
+};
 
 struct RoundUnit {
   static constexpr std::size_t kNoPlan = SIZE_MAX;
@@ -99,9 +108,10 @@ class Round {
   MoveId move;
   std::shared_ptr<const RunningPlan> running;  // the basis of late moves; null: none can be planned
   PlanPrediction prediction;                   // added to the view when the motion starts
-  double end_s = 0;                            // predicted, after the start signal
-  std::uint64_t commit_batch = 0;              // of the intents
-  HostInstant started = kNever;                // the start signal
+  BorderRound border;
+  double end_s = 0;                // predicted, after the start signal
+  std::uint64_t commit_batch = 0;  // of the intents
+  HostInstant started = kNever;    // the start signal
   HostInstant last_arrival;
   std::uint64_t settled_batch = 0;  // with which the end of the last motion becomes durable
   // The start skew that this round is planned for, and that the next one will be: any unit may

@@ -65,7 +65,7 @@ std::optional<PlanJob> JobOfRound(bool sets_out, ExecutorRooms* rooms) {
     for (std::uint32_t n = 0; n < fleet.units.size(); ++n)
       if (job.targets[n]) job.targets[n] = configuration[{n}].target;
   }
-  if (!any) return std::nullopt;
+  if (!any && !fleet.config.in_plane) return std::nullopt;
   return job;
 }
 

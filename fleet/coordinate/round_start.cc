@@ -24,8 +24,8 @@ std::string InMilliseconds(double time_s) {
 
 }  // namespace
 
-HostInstant RoundStart::Begin() {
-  round_.started = fleet_.now() + fleet_.config.start_delay;
+HostInstant RoundStart::Begin(HostInstant at) {
+  round_.started = at;
   round_.last_arrival = round_.started;
   said_ = 0;
   for (const UnitPlan& move : round_.plan.moves) {

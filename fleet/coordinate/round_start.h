@@ -16,9 +16,9 @@ class RoundStart {
   /// `round` outlives this.
   RoundStart(const Coordination& fleet, Round* round) : fleet_(fleet), round_(*round) {}
 
-  /// All units of the plan start: fixes the start instant and says it for the first time. Returns
-  /// when it is to be repeated; kNever: not any more.
-  HostInstant Begin();
+  /// All units of the plan start at this instant: says it for the first time. Returns when it is to
+  /// be repeated; kNever: not any more.
+  HostInstant Begin(HostInstant at);
   /// Says the start signal again where that is due; returns as Begin.
   HostInstant Repeat();
   /// The start signal is not said any more.

@@ -20,6 +20,46 @@ void SetWatch(const Coordination& fleet, const Round& round, PositionerIndex i) 
     motion.watch_from = std::min(motion.watch_from, round.AtPlanTime(follower.since_s));
     motion.watch_until = std::max(motion.watch_until, round.AtPlanTime(follower.left_s));
   }
+  if (const auto beyond = round.border.leads.find(i.value); beyond != round.border.leads.end()) {
+    motion.watch_from = std::min(motion.watch_from, round.AtPlanTime(beyond->second.since_s));
+    motion.watch_until = std::max(motion.watch_until, round.AtPlanTime(beyond->second.left_s));
+  }
+}
+
+bool Concerns(const Round& round, double since_s, double left_s, const Ended& when) {
+  return round.AtPlanTime(left_s) >= when.from && round.AtPlanTime(since_s) <= when.until;
+}
+
+/// Units that may have ended, whose followers have not been looked at yet.
+using Open = std::vector<std::pair<PositionerIndex, Ended>>;
+
+void StopFollower(const Coordination& fleet, const Round& round, const UnitPlan::Follower& follower,
+                  const Ended& when, const std::string& reason, Open* open) {
+  if (!Concerns(round, follower.since_s, follower.left_s, when)) return;
+  const UnitRecord& unit = fleet.units[follower.unit];
+  const bool asked =
+      unit.request.question && std::holds_alternative<Stop>(unit.request.question->message);
+  if (round.part(follower.unit) != Part::kMoving || unit.view.phase != UnitPhase::kMoving || asked)
+    return;
+  StopOne(fleet, follower.unit, reason);
+  // The follower ends when the stop gets through. Should that take longer, it is judged anew then.
+  open->push_back({follower.unit, {fleet.now(), fleet.now() + fleet.requests.Patience()}});
+}
+
+void StopFollowersOf(const Coordination& fleet, const Round& round, Open open,
+                     const std::string& reason) {
+  while (!open.empty()) {
+    const auto [i, when] = open.back();
+    open.pop_back();
+    const auto beyond = round.border.leads.find(i.value);
+    if (beyond != round.border.leads.end() &&
+        Concerns(round, beyond->second.since_s, beyond->second.left_s, when))
+      fleet.out().border_ends.push_back({fleet.layout.unit(i).id, when.from, when.until});
+    const UnitPlan* const plan = round.PlanOf(i);
+    if (plan == nullptr) continue;
+    for (const UnitPlan::Follower& follower : plan->followers)
+      StopFollower(fleet, round, follower, when, reason, &open);
+  }
 }
 
 }  // namespace
@@ -62,28 +102,16 @@ Ended SeenUntil(const Coordination& fleet, PositionerIndex i, HostInstant until)
 
 void StopFollowers(const Coordination& fleet, const Round& round, PositionerIndex first,
                    const Ended& ended, const std::string& reason) {
-  std::vector<std::pair<PositionerIndex, Ended>> open{{first, ended}};
-  while (!open.empty()) {
-    const auto [i, when] = open.back();
-    open.pop_back();
-    const UnitPlan* const plan = round.PlanOf(i);
-    if (plan == nullptr) continue;
-    for (const UnitPlan::Follower& follower : plan->followers) {
-      if (round.AtPlanTime(follower.left_s) < when.from ||
-          round.AtPlanTime(follower.since_s) > when.until)
-        continue;
-      const UnitRecord& unit = fleet.units[follower.unit];
-      const bool asked =
-          unit.request.question && std::holds_alternative<Stop>(unit.request.question->message);
-      if (round.part(follower.unit) != Part::kMoving || unit.view.phase != UnitPhase::kMoving ||
-          asked)
-        continue;
-      StopOne(fleet, follower.unit, reason);
-      // The follower ends when the stop gets through. Should that take longer, it is judged anew
-      // then.
-      open.push_back({follower.unit, {fleet.now(), fleet.now() + fleet.requests.Patience()}});
-    }
-  }
+  StopFollowersOf(fleet, round, {{first, ended}}, reason);
+}
+
+void StopFollowersBeyond(const Coordination& fleet, const Round& round,
+                         const BorderEndCommand& end) {
+  Open open;
+  for (const SectorRound::FollowsBeyond& follows : round.border.follows)
+    if (std::ranges::find(end.leaders, follows.leader) != end.leaders.end())
+      StopFollower(fleet, round, follows.follower, {end.from, end.until}, end.reason, &open);
+  StopFollowersOf(fleet, round, std::move(open), end.reason);
 }
 
 void StopOne(const Coordination& fleet, PositionerIndex i, const std::string& reason) {

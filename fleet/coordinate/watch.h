@@ -10,6 +10,7 @@
 
 #include "fleet/coordinate/coordination.h"
 #include "fleet/coordinate/round.h"
+#include "fleet/coordinate/sector_round.h"
 
 namespace focalfleet {
 
@@ -32,6 +33,9 @@ struct Ended {
 /// `first` may have ended within `ended`: stops the units that come where it may stand.
 void StopFollowers(const Coordination& fleet, const Round& round, PositionerIndex first,
                    const Ended& ended, const std::string& reason);
+/// Units beyond the border may have ended: stops the units that come where they may stand.
+void StopFollowersBeyond(const Coordination& fleet, const Round& round,
+                         const BorderEndCommand& end);
 /// Asks one unit to stop until it answers.
 void StopOne(const Coordination& fleet, PositionerIndex i, const std::string& reason);
 

@@ -8,6 +8,9 @@ namespace focalfleet::limits {
 
 inline constexpr std::uint32_t kUnits = 32'768;
 inline constexpr std::uint32_t kBuses = 512;
+inline constexpr std::uint32_t kSectors = 64;          // of a plane
+inline constexpr std::uint32_t kRoundsPerPlane = 12;   // of a configuration over sectors
+inline constexpr std::uint32_t kBorderEnds = 4096;     // of a sector in a round
 inline constexpr std::uint32_t kNodesPerBus = 128;     // electrical: a CAN segment carries no more
 inline constexpr std::uint32_t kSegmentsPerAxis = 15;  // of a move; two 4-bit counts on the wire
 // Units whose reach overlaps; 6 to 30 are usual.

@@ -1,0 +1,60 @@
+#include "fleet/coordinate/sector_rounds.h"
+
+#include <string>
+
+#include "fleet/coordinate/watch.h"
+
+namespace focalfleet {
+
+Status SectorRounds::Do(const SectorRound& round) {
+  if (const std::string fault = FaultOf(round, rooms_.fleet.units.size()); !fault.empty())
+    return Fail(ErrorCode::kInvalid, "the round is refused: " + fault);
+  if (rooms_.configuration.phase() != ConfigurationPhase::kPlanning ||
+      round.job != rooms_.round.job)
+    return Fail(ErrorCode::kRefused, "nobody waits for this round");
+  progress_.TakeRound(round);
+  return {};
+}
+
+Status SectorRounds::Do(const SectorStartCommand& start) {
+  if (View().stage != SectorStage::kReady || start.job != rooms_.round.job)
+    return Fail(ErrorCode::kRefused, "this round is not held");
+  // The start signal is said three times, and has to reach the units before the instant.
+  if (start.at < rooms_.fleet.now() + DurationNs{rooms_.fleet.config.start_delay.ns / 2})
+    return Fail(ErrorCode::kRefused, "the start comes too late");
+  rooms_.round.border.start_at = start.at;
+  return {};
+}
+
+Status SectorRounds::Do(const SectorWithdrawCommand& withdraw) {
+  if (withdraw.job == rooms_.round.job) progress_.Withdraw();
+  return {};
+}
+
+Status SectorRounds::Do(const BorderEndCommand& end) {
+  if (rooms_.configuration.phase() == ConfigurationPhase::kMoving)
+    StopFollowersBeyond(rooms_.fleet, rooms_.round, end);
+  return {};
+}
+
+SectorView SectorRounds::View() const {
+  const auto stage = [this] {
+    switch (rooms_.configuration.phase()) {
+      case ConfigurationPhase::kIdle:
+        return SectorStage::kIdle;
+      case ConfigurationPhase::kPlanning:
+        return SectorStage::kAsking;
+      case ConfigurationPhase::kCommitting:
+        return IsHeld(rooms_) ? SectorStage::kReady : SectorStage::kPreparing;
+      case ConfigurationPhase::kMoving:
+        return SectorStage::kMoving;
+      case ConfigurationPhase::kReporting:
+        return SectorStage::kEnding;
+      default:
+        return SectorStage::kPreparing;
+    }
+  };
+  return {stage(), rooms_.round.job};
+}
+
+}  // namespace focalfleet
