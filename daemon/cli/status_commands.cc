@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <utility>
 
 #include "daemon/cli/client.h"
@@ -21,6 +22,7 @@ namespace {
 
 struct StatusOptions {
   bool buses = false;
+  std::optional<std::uint32_t> sector;
 };
 
 std::string Counted(const Json& counts) {
@@ -96,12 +98,65 @@ std::string DescribeStatus(const Json& status, const StatusOptions& options, boo
   return text;
 }
 
+std::string DescribeSector(const Json& sector, bool colour_on) {
+  const std::string trouble = TextIn(sector, "trouble");
+  std::string text = fmt::format("  sector {}: {} units, {}", CountIn(sector, "sector"),
+                                 CountIn(sector, "units"), TextIn(sector, "stage"));
+  if (CountIn(sector, "targeted") > 0)
+    text +=
+        fmt::format(", {} of {} arrived", CountIn(sector, "arrived"), CountIn(sector, "targeted"));
+  text += ", clock known to " + Shown(sector, "clock_bound_ms", "ms", 2);
+  if (!trouble.empty()) text += ", " + Paint(colour_on, Colour::kRed, "it " + trouble);
+  if (const std::string word = TextIn(sector, "last_word"); !word.empty())
+    text += " (" + word + ")";
+  return text + "\n";
+}
+
+/// The status of the coordinator of a plane.
+std::string DescribePlane(const Json& status, bool colour_on) {
+  const Json& plane = ObjectIn(status, "plane");
+  const Json& configuration = ObjectIn(status, "configuration");
+  std::string text =
+      fmt::format("focalfleetd {}, coordinator of {} units in {} sectors: {}, epoch {}\n",
+                  TextIn(status, "version"), CountIn(status, "units"),
+                  ListIn(plane, "sectors").size(), TextIn(plane, "phase"), CountIn(plane, "epoch"));
+  if (const std::string waits = TextIn(plane, "waiting_for"); !waits.empty())
+    text += "waits for  " + Paint(colour_on, Colour::kYellow, waits) + "\n";
+  for (const Json& sector : ListIn(plane, "sectors")) text += DescribeSector(sector, colour_on);
+  if (CountIn(configuration, "id") == 0) return text + "no configuration yet";
+  const Json& guarantee = ObjectIn(configuration, "guarantee");
+  text += fmt::format(
+      "configuration {} ({}): {}, round {}\n  {} of {} units arrived, {} refused, {} failed, {} "
+      "stopped, {} in sectors that were left out\n",
+      CountIn(configuration, "id"), TextIn(configuration, "source"), TextIn(configuration, "state"),
+      CountIn(configuration, "round"), CountIn(configuration, "arrived"),
+      CountIn(configuration, "targeted"), CountIn(configuration, "refused"),
+      CountIn(configuration, "failed"), CountIn(configuration, "stopped"),
+      CountIn(configuration, "left_out"));
+  return text + fmt::format(
+                    "  {} pairs follow each other across borders, {} of them beyond the "
+                    "notice",
+                    CountIn(guarantee, "follows_beyond"), ListIn(guarantee, "unnoticed").size());
+}
+
 ExitCode RunStatus(const Context& context, const StatusOptions& options) {
   auto status = Ask(context, {.verb = "status"});
   if (!status) return Report(context, status.error());
+  if (options.sector) {
+    const Json& sectors = ListIn(ObjectIn(*status, "plane"), "sectors");
+    if (*options.sector >= sectors.size())
+      return Report(context, {ErrorCode::kInvalid,
+                              fmt::format("--sector {}: this daemon coordinates {} sectors",
+                                          *options.sector, sectors.size())});
+    const Json sector = sectors[*options.sector];
+    if (context.json) PrintJson(sector);
+    Say(context, DescribeSector(sector, context.colour_out));
+    return ExitCode::kOk;
+  }
   (*status)["client_version"] = ClientVersion();
   if (context.json) PrintJson(*status);
-  Say(context, DescribeStatus(*status, options, context.colour_out));
+  Say(context, status->contains("plane") ? DescribePlane(*status, context.colour_out)
+                                         : DescribeStatus(*status, options, context.colour_out));
   return ExitCode::kOk;
 }
 
@@ -112,6 +167,8 @@ void AddStatus(CommandLine* line) {
   auto options = std::make_shared<StatusOptions>();
   command->add_flag("--buses", options->buses,
                     "A line for every bus, not only for those in trouble");
+  command->add_option("--sector", options->sector,
+                      "Of a plane: this sector alone, by its number from 0");
   OnChosen(line, command, options, RunStatus);
 }
 

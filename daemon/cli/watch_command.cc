@@ -22,6 +22,7 @@ using std::chrono::steady_clock;
 
 struct WatchOptions {
   std::uint32_t domain = 0;
+  std::optional<std::uint32_t> sector;  // of a plane
   bool once = false;
   double wait_s = 5;
 };
@@ -337,7 +338,9 @@ ExitCode RunWatch(const Context& context, const WatchOptions& options) {
   std::signal(SIGINT, [](int) { interrupted = 1; });
   const char* config = std::getenv("CYCLONEDDS_URI");
   auto reader = StatusReader::Create(
-      {.dds = {.domain = options.domain, .config_xml = config != nullptr ? config : ""}});
+      {.dds = {.domain = options.domain,
+               .config_xml = config != nullptr ? config : "",
+               .partition = options.sector ? SectorPartition(*options.sector) : ""}});
   if (!reader) return Report(context, reader.error(), ExitCode::kNoDaemon);
   return Loop(context, options, reader->get());
 }
@@ -349,6 +352,7 @@ void AddWatchCommand(CommandLine* line) {
                                  "  focalfleet watch\n  focalfleet watch --once\n"
                                  "  focalfleet watch --json | jq -c .fleet");
   auto options = std::make_shared<WatchOptions>();
+  command->add_option("--sector", options->sector, "Of a plane: this sector, by its number from 0");
   command->add_option("--domain", options->domain, "DDS domain")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();

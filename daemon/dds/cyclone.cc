@@ -39,8 +39,24 @@ struct DeleteQos {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
 };
 
-std::unique_ptr<dds_qos_t, DeleteQos> SharedQos() {
-  std::unique_ptr<dds_qos_t, DeleteQos> qos(dds_create_qos());
+using QosOwner = std::unique_ptr<dds_qos_t, DeleteQos>;
+
+void SetPartition(const std::string& partition, dds_qos_t* qos) {
+  if (!partition.empty()) dds_qset_partition1(qos, partition.c_str());
+}
+
+/// For messages that are said now, to those who are there.
+QosOwner PassingQos(std::int32_t depth, const std::string& partition) {
+  QosOwner qos(dds_create_qos());
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
+  dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+  SetPartition(partition, qos.get());
+  return qos;
+}
+
+QosOwner SharedQos() {
+  QosOwner qos(dds_create_qos());
   // The blocking time is 0: a writer whose readers lag refuses the sample, and the tick goes on.
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
   dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
@@ -138,28 +154,38 @@ Result<Handle> MakeTopic(const Participant& participant, const dds_topic_descrip
   return topic;
 }
 
-Result<Handle> MakeWriter(const Participant& participant, Handle topic) {
-  const dds_entity_t writer =
-      dds_create_writer(participant.get(), topic, SharedQos().get(), nullptr);
+Result<Handle> MakeWriter(const Participant& participant, Handle topic,
+                          const std::string& partition) {
+  const QosOwner qos = SharedQos();
+  SetPartition(partition, qos.get());
+  const dds_entity_t writer = dds_create_writer(participant.get(), topic, qos.get(), nullptr);
   if (writer < 0) return DdsFailure("make a writer", writer);
   return writer;
 }
 
-Result<Handle> MakeReader(const Participant& participant, Handle topic) {
-  const dds_entity_t reader =
-      dds_create_reader(participant.get(), topic, SharedQos().get(), nullptr);
+Result<Handle> MakeReader(const Participant& participant, Handle topic,
+                          const std::string& partition) {
+  const QosOwner qos = SharedQos();
+  SetPartition(partition, qos.get());
+  const dds_entity_t reader = dds_create_reader(participant.get(), topic, qos.get(), nullptr);
   if (reader < 0) return DdsFailure("make a reader", reader);
   return reader;
 }
 
-Result<Handle> MakeListener(const Participant& participant, Handle topic, std::int32_t depth) {
-  const std::unique_ptr<dds_qos_t, DeleteQos> qos(dds_create_qos());
-  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
-  dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+Result<Handle> MakeListener(const Participant& participant, Handle topic, std::int32_t depth,
+                            const std::string& partition) {
+  const QosOwner qos = PassingQos(depth, partition);
   const dds_entity_t reader = dds_create_reader(participant.get(), topic, qos.get(), nullptr);
   if (reader < 0) return DdsFailure("make a reader", reader);
   return reader;
+}
+
+Result<Handle> MakeTalker(const Participant& participant, Handle topic, std::int32_t depth,
+                          const std::string& partition) {
+  const QosOwner qos = PassingQos(depth, partition);
+  const dds_entity_t writer = dds_create_writer(participant.get(), topic, qos.get(), nullptr);
+  if (writer < 0) return DdsFailure("make a writer", writer);
+  return writer;
 }
 
 }  // namespace focalfleet::dds_internal

@@ -23,6 +23,9 @@ inline constexpr const char* kAlarmTopic = "focalfleet/named_alarm";
 inline constexpr const char* kAuditHeadTopic = "focalfleet/audit_head";
 inline constexpr const char* kExposureRequestTopic = "focalfleet/exposure_request";
 inline constexpr const char* kExposureTopic = "focalfleet/exposure";
+inline constexpr const char* kPlaneOrderTopic = "focalfleet/plane_order";
+inline constexpr const char* kSectorReportTopic = "focalfleet/sector_report";
+inline constexpr const char* kBorderNewsTopic = "focalfleet/border_news";
 
 /// Owns a DDS entity; its destructor deletes the entity and all that was made under it.
 class Entity {
@@ -79,9 +82,17 @@ class Participant {
 
 Result<Handle> MakeTopic(const Participant& participant, const dds_topic_descriptor& type,
                          const char* name);
-Result<Handle> MakeWriter(const Participant& participant, Handle topic);
-Result<Handle> MakeReader(const Participant& participant, Handle topic);
+/// `partition` of a writer or reader, here and below; empty: the one without a name, where daemons
+/// of their own are. A reader's may have wildcards.
+Result<Handle> MakeWriter(const Participant& participant, Handle topic,
+                          const std::string& partition = {});
+Result<Handle> MakeReader(const Participant& participant, Handle topic,
+                          const std::string& partition = {});
 /// A reader that receives each sample from now on, and keeps the last `depth` of them.
-Result<Handle> MakeListener(const Participant& participant, Handle topic, std::int32_t depth);
+Result<Handle> MakeListener(const Participant& participant, Handle topic, std::int32_t depth,
+                            const std::string& partition = {});
+/// A writer for such readers: nothing is kept for those that join later.
+Result<Handle> MakeTalker(const Participant& participant, Handle topic, std::int32_t depth,
+                          const std::string& partition = {});
 
 }  // namespace focalfleet::dds_internal

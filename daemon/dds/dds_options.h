@@ -14,6 +14,8 @@ struct DdsOptions {
   std::string config_xml;
   /// Folder of credentials for DDS Security (credentials.h); empty: without.
   std::string security = {};
+  /// The partition of all status topics (SectorPartition); empty: that of a daemon of its own.
+  std::string partition = {};
 };
 
 /// Cyclone DDS keeps one set of permissions for each of its domains in a process. A participant

@@ -51,6 +51,10 @@ tl::unexpected<Error> BadCode(const char* of, std::uint64_t id, const char* whic
 
 }  // namespace
 
+std::string SectorPartition(std::optional<std::uint32_t> sector) {
+  return sector ? "sector-" + std::to_string(*sector) : "sector-*";
+}
+
 class StatusPublisher::Impl {
  public:
   static Result<std::unique_ptr<Impl>> Create(const DdsOptions& options) {
@@ -74,7 +78,8 @@ class StatusPublisher::Impl {
     };
     for (const auto& [writer, type, name] : list) {
       FOCALFLEET_TRY_ASSIGN(const Handle topic, MakeTopic(impl->participant_, *type, name));
-      FOCALFLEET_TRY_ASSIGN((*impl).*writer, MakeWriter(impl->participant_, topic));
+      FOCALFLEET_TRY_ASSIGN((*impl).*writer,
+                            MakeWriter(impl->participant_, topic, options.partition));
     }
     return impl;
   }

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "daemon/dds/dds_options.h"
@@ -20,6 +21,9 @@
 #include "protocol/base/result.h"
 
 namespace focalfleet {
+
+/// The partition of all topics of a sector of a plane; none: of all sectors, for readers.
+std::string SectorPartition(std::optional<std::uint32_t> sector);
 
 struct PublisherCounters {
   std::uint64_t samples = 0;

@@ -15,6 +15,7 @@ class StatusReader::Impl {
  public:
   static Result<std::unique_ptr<Impl>> Create(const Options& options) {
     auto impl = std::make_unique<Impl>();
+    impl->partition_ = options.dds.partition;
     FOCALFLEET_TRY_ASSIGN(impl->participant_, Participant::Join(options.dds));
     const dds_entity_t waitset = dds_create_waitset(impl->participant_.get());
     if (waitset < 0) return DdsFailure("make a waitset", waitset);
@@ -96,7 +97,7 @@ class StatusReader::Impl {
  private:
   Result<Handle> Open(const dds_topic_descriptor_t& type, const char* name) {
     FOCALFLEET_TRY_ASSIGN(const Handle topic, MakeTopic(participant_, type, name));
-    FOCALFLEET_TRY_ASSIGN(const Handle reader, MakeReader(participant_, topic));
+    FOCALFLEET_TRY_ASSIGN(const Handle reader, MakeReader(participant_, topic, partition_));
     const dds_entity_t condition = dds_create_readcondition(reader, DDS_ANY_STATE);
     if (condition < 0) return DdsFailure("make a condition", condition);
     const dds_return_t code = dds_waitset_attach(waitset_, condition, condition);
@@ -128,6 +129,7 @@ class StatusReader::Impl {
     }
   }
 
+  std::string partition_;
   Participant participant_;
   Handle waitset_ = 0;
   Handle fleet_ = 0;

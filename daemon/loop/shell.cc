@@ -25,6 +25,7 @@ HostInstant Shell::wake_at() {
   if (parts_.scheduler != nullptr) wake = std::min(wake, parts_.scheduler->wake_at());
   if (parts_.metrics != nullptr) wake = std::min(wake, parts_.metrics->wake_at());
   if (parts_.sync != nullptr) wake = std::min(wake, parts_.sync->wake_at());
+  if (parts_.sector != nullptr) wake = std::min(wake, parts_.sector->wake_at());
   return wake;
 }
 
@@ -80,12 +81,15 @@ void Shell::Gather() {
   }
   while (auto done = parts_.camera != nullptr ? parts_.camera->Take() : std::nullopt)
     exposures_.push_back(std::move(*done));
+  notes_.clear();
   if (parts_.troubles != nullptr) notes_ = parts_.troubles->TakeNotes();
   if (std::exchange(requests_ready_, false)) parts_.handler->Service(View(), &commands_);
   if (auto preview = parts_.handler->TakePreview()) SubmitPlan(std::move(*preview));
   while (const auto answer = parts_.reader->Take()) parts_.handler->Answered(*answer);
   parts_.handler->SubmitQuestions(
       [this](StoreQuestion* question) { return parts_.reader->Submit(question); });
+  if (parts_.sector != nullptr)
+    parts_.sector->Gather(now_, *parts_.coordinator, &commands_, &notes_);
 }
 
 bool Shell::StepIsDue() const {
@@ -137,6 +141,7 @@ void Shell::Perform() {
   for (const OutFrame& frame : effects_.frames) parts_.lines->Put(frame, now_);
   parts_.passed(TurnPoint::kFramesPut);
   if (effects_.sync_at && parts_.sync != nullptr) parts_.sync->Plan(*effects_.sync_at);
+  if (parts_.sector != nullptr) parts_.sector->Take(&effects_);
   if (effects_.plan_job) SubmitPlan(std::move(*effects_.plan_job));
   if (effects_.exposure && parts_.camera != nullptr) {
     const auto drives = parts_.coordinator->drives();

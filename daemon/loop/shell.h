@@ -17,6 +17,7 @@
 #include "daemon/clock/clock.h"
 #include "daemon/loop/bus_lines.h"
 #include "daemon/loop/job_queue.h"
+#include "daemon/loop/sector_port.h"
 #include "daemon/loop/service_report.h"
 #include "daemon/loop/store_writer.h"
 #include "daemon/loop/sync_pulse.h"
@@ -73,6 +74,7 @@ class Shell {
     StatusScheduler* scheduler = nullptr;  // none: DDS is off
     MetricsSampler* metrics = nullptr;     // none: no metrics are served
     SyncPulse* sync = nullptr;             // none: no SYNC line
+    SectorPort* sector = nullptr;          // none: the daemon is no sector of a plane
     DdsTroubles* troubles = nullptr;       // none: no part has troubles to report
     ServiceReport* service = nullptr;      // none: no service manager
     HostClock clock;

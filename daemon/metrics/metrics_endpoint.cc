@@ -17,6 +17,13 @@ HttpAnswer NoValuesYet() { return {.status = 503, .body = "the daemon has just s
 
 }  // namespace
 
+ShellNote NoteOfMetrics(const std::string& trouble) {
+  if (trouble.empty())
+    return {AlarmName::kMetricsBack, "metrics are served again", AlarmName::kMetricsMissing};
+  return {AlarmName::kMetricsMissing,
+          "no metrics, the fleet works on and it is tried again: " + trouble};
+}
+
 MetricsEndpoint::MetricsEndpoint(Parts parts, HttpServer::Options server)
     : parts_(std::move(parts)), server_(WithPages(std::move(server))) {}
 

@@ -12,8 +12,12 @@
 #include "daemon/metrics/fleet_metrics.h"
 #include "daemon/metrics/newest_value.h"
 #include "daemon/metrics/work_counters.h"
+#include "fleet/coordinate/inputs.h"
 
 namespace focalfleet {
+
+/// The note for the fleet about the server's trouble; empty: it serves again.
+ShellNote NoteOfMetrics(const std::string& trouble);
 
 class MetricsEndpoint {
  public:

@@ -4,11 +4,18 @@
 #include "daemon/process/daemon.h"
 #include "daemon/process/fleet_setup.h"
 #include "daemon/process/http_door.h"
+#include "daemon/process/plane_daemon.h"
 
 namespace focalfleet {
 
 Result<std::string> CheckDaemon(const DaemonConfig& config) {
-  FOCALFLEET_TRY_ASSIGN(const Layout layout, LoadLayout(config.fleet));
+  if (config.plane.coordinates()) {
+    FOCALFLEET_TRY_ASSIGN(const PlaneLayout plane, LoadPlane(config));
+    FOCALFLEET_TRY(FindRoles(config.control));
+    return "# " + std::to_string(plane.layout().size()) + " units in " +
+           std::to_string(plane.sectors()) + " sectors\n" + EffectiveConfig(config);
+  }
+  FOCALFLEET_TRY_ASSIGN(const Layout layout, LoadOwnLayout(config));
   FOCALFLEET_TRY(FindRoles(config.control));
   FOCALFLEET_TRY(CheckHttpDoor(config.http));
   FOCALFLEET_TRY(CheckInterfaces(config, layout));

@@ -298,6 +298,12 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
                   "participants that join with renewed credentials");
   reader->Require(IsNumericAddress(config.metrics.address), "metrics", "address",
                   "metrics.address must be a numeric address of this host, such as \"127.0.0.1\"");
+  reader->Require(!config.plane.coordinates() || !config.sector.present(), "sector", "buses",
+                  "a daemon is the coordinator of a plane or one of its sectors, not both");
+  reader->Require(config.dds.enabled || !(config.plane.coordinates() || config.sector.present()),
+                  "dds", "enabled", "the daemons of a plane speak through DDS: dds.enabled");
+  reader->Require(!config.sector.present() || !config.camera.present(), "camera", "directory",
+                  "a sector of a plane has no camera: configurations are the plane's");
   reader->Require(!config.fleet.units.empty(), "fleet", "units", "fleet.units must name a file");
   reader->Require(!config.store.path.empty(), "store", "path", "store.path must name a file");
   reader->Require(!config.control.socket.empty(), "control", "socket",
@@ -328,6 +334,9 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   config.timing.reads_sensors = !config.hall.model.empty();
   config.timing.data_bit_rate_bps = config.bus.can_fd ? config.bus.data_bit_rate_bps : 0;
   config.timing.sync_line = !config.sync.chip.empty();
+  config.timing.in_plane = config.sector.present();
+  config.plane.sectors_at = reader.At("plane", "sectors");
+  config.sector.buses_at = reader.At("sector", "buses");
   config.http.tokens_at = reader.At("http", "tokens");
   config.control.roles_at = reader.At("control", "engineers");
   config.sync.chip_at = reader.At("sync", "chip");

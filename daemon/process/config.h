@@ -42,6 +42,17 @@ struct DaemonConfig {
     std::string config;    // Cyclone's XML file; empty: loopback only
     std::string security;  // folder of credentials for DDS Security; empty: without
   } dds;
+  struct Plane {
+    std::vector<std::string> sectors;  // buses of each sector; empty: no coordinator of a plane
+    std::string sectors_at;            // file:line, for messages
+    [[nodiscard]] bool coordinates() const { return !sectors.empty(); }
+  } plane;
+  struct Sector {
+    std::string buses;         // of the plane's units file; empty: this daemon is no sector
+    std::uint32_t number = 0;  // place in the coordinator's list, from 0
+    std::string buses_at;      // file:line, for messages
+    [[nodiscard]] bool present() const { return !buses.empty(); }
+  } sector;
   struct Log {
     std::string level = "info";
     std::string file;     // empty: standard error

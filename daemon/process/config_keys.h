@@ -100,6 +100,14 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Path("security", &c->dds.security,
               "Folder of credentials for DDS Security, as make-keys writes it; empty: everybody in "
               "the domain may read and write");
+  visit->Section("plane", "A focal plane of several daemons; this one is its coordinator");
+  visit->Texts("sectors", &c->plane.sectors,
+               "Buses of each sector, as 0-12; empty: this daemon coordinates no plane");
+  visit->Section("sector", "This daemon owns one sector of a plane");
+  visit->Text("buses", &c->sector.buses,
+              "Buses of this sector, as 0-12; empty: this daemon owns all buses of its units file");
+  visit->Whole("number", &c->sector.number, {0, 63},
+               "Place of this sector in the coordinator's list, from 0");
   visit->Section("log", "The daemon's log");
   visit->Choice("level", &c->log.level, kLogLevels, "The least important lines that are logged");
   visit->Path("file", &c->log.file,

@@ -25,6 +25,8 @@
 #include "daemon/process/http_door.h"
 #include "daemon/process/journal_setup.h"
 #include "daemon/process/log.h"
+#include "daemon/process/plane_daemon.h"
+#include "daemon/process/sector_setup.h"
 #include "daemon/process/slow_end.h"
 #include "daemon/process/status_output.h"
 #include "daemon/process/store_upkeep.h"
@@ -78,6 +80,12 @@ struct Doors {
   std::unique_ptr<HttpServer> http;  // none: [http] has no port
 };
 
+/// Parts that share the common start with others.
+struct CommonStart {
+  std::unique_ptr<SyncPulse> sync;     // none: no SYNC line
+  std::unique_ptr<SectorSeat> sector;  // none: the daemon is no sector of a plane
+};
+
 struct StoreThreads {
   std::unique_ptr<journal::JournalThread> journal;  // none: [journal] has a limit of 0
   std::unique_ptr<StoreThread> writer;
@@ -95,19 +103,6 @@ struct Metrics {
 
 double SecondsSince(std::chrono::steady_clock::time_point begun) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-}
-
-ShellNote NoteOfMetrics(const std::string& trouble) {
-  if (trouble.empty())
-    return {AlarmName::kMetricsBack, "metrics are served again", AlarmName::kMetricsMissing};
-  return {AlarmName::kMetricsMissing,
-          "no metrics, the fleet works on and it is tried again: " + trouble};
-}
-
-std::function<void(const Inputs&, const Effects&)> Journalling(journal::JournalThread* journal) {
-  return [journal](const Inputs& inputs, const Effects& effects) {
-    if (journal != nullptr) journal->Take(inputs, effects);
-  };
 }
 
 class Daemon {
@@ -153,7 +148,7 @@ class Daemon {
   std::unique_ptr<ModelRegistry> models_;
   AlarmRegister alarms_;
   Doors doors_;
-  std::unique_ptr<SyncPulse> sync_;  // none: no SYNC line
+  CommonStart start_;
   std::unique_ptr<EventLoop> loop_;
   std::unique_ptr<BoundedEnd> ending_;
   bool left_ = false;
@@ -163,7 +158,7 @@ Status Daemon::Start() {
   FOCALFLEET_TRY_ASSIGN(EventSignal signal, EventSignal::Create());
   signal_ = std::make_unique<EventSignal>(std::move(signal));
   status_.troubles = std::make_unique<DdsTroubles>([this] { signal_->Raise(); });
-  FOCALFLEET_TRY_ASSIGN(Layout layout, LoadLayout(config_.fleet));
+  FOCALFLEET_TRY_ASSIGN(Layout layout, LoadOwnLayout(config_));
   layout_ = std::make_unique<Layout>(std::move(layout));
   FOCALFLEET_TRY_ASSIGN(store_, Store::Open(config_.store.path));
   FOCALFLEET_TRY_ASSIGN(StoredFleet stored, store_->Load());
@@ -172,8 +167,8 @@ Status Daemon::Start() {
   FOCALFLEET_TRY_ASSIGN(auto ports, OpenPorts(config_, *layout_, clock_));
   FOCALFLEET_TRY_ASSIGN(auto sync, OpenSync(config_.sync));
   if (sync != nullptr)
-    sync_ = std::make_unique<SyncPulse>(std::move(sync),
-                                        SyncPulse::Options{.late_most = config_.timing.sync_lead});
+    start_.sync = std::make_unique<SyncPulse>(
+        std::move(sync), SyncPulse::Options{.late_most = config_.timing.sync_lead});
   const auto buses = layout_->buses();
   lines_ =
       std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()), std::move(ports));
@@ -316,6 +311,8 @@ Status Daemon::StartThreads() {
             },
             signal_.get(), {.name = "camera", .alive = Answering(&service_.camera)}));
   }
+  FOCALFLEET_TRY_ASSIGN(start_.sector,
+                        OpenSector(config_, *layout_, status_.troubles.get(), signal_.get()));
   OpenService();
   FOCALFLEET_TRY_ASSIGN(loop_,
                         EventLoop::Create({.shell = {.layout = layout_.get(),
@@ -331,7 +328,8 @@ Status Daemon::StartThreads() {
                                                      .reader = stored_.reader.get(),
                                                      .scheduler = status_.scheduler.get(),
                                                      .metrics = metrics_.sampler.get(),
-                                                     .sync = sync_.get(),
+                                                     .sync = start_.sync.get(),
+                                                     .sector = start_.sector.get(),
                                                      .troubles = status_.troubles.get(),
                                                      .service = service_.report.get(),
                                                      .clock = clock_,
@@ -484,6 +482,7 @@ const char* Version() { return BuildVersion(); }
 DaemonEnd RunDaemon(const DaemonConfig& config) {
   EventLoop::BlockSignals();
   if (Status open = OpenLog(config.log, JournalOfThisProcess()); !open) return {std::move(open)};
+  if (config.plane.coordinates()) return {RunPlane(config)};
   auto daemon = std::make_unique<Daemon>(config);
   Status ended = daemon->Start();
   if (ended) ended = daemon->Run();

@@ -13,6 +13,12 @@ DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds) {
           .security = dds.security};
 }
 
+DdsOptions StatusOptionsOf(const DaemonConfig& config) {
+  DdsOptions options = DdsOptionsOf(config.dds);
+  if (config.sector.present()) options.partition = SectorPartition(config.sector.number);
+  return options;
+}
+
 void WarnOfDdsEnvironment(const DaemonConfig::Dds& dds) {
   if (std::getenv("CYCLONEDDS_URI") != nullptr)
     spdlog::warn("CYCLONEDDS_URI is set and is not used: dds.config says where status goes, {}",

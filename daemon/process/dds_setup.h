@@ -12,6 +12,8 @@
 namespace focalfleet {
 
 DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds);
+/// The same for status: that of a sector is in the sector's partition.
+DdsOptions StatusOptionsOf(const DaemonConfig& config);
 
 /// The log says that $CYCLONEDDS_URI is not read, where it is set.
 void WarnOfDdsEnvironment(const DaemonConfig::Dds& dds);

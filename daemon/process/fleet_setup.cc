@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "daemon/control/id_ranges.h"
 #include "daemon/files/text_file.h"
 #include "daemon/ports/simulated_port.h"
 #include "daemon/ports/socket_opener.h"
@@ -100,6 +101,25 @@ Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet) {
   }
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTableAsText(fleet.units, "unit_id"));
   return ReadLayout(text, fleet.units, std::move(options));
+}
+
+Result<Layout> LoadOwnLayout(const DaemonConfig& config) {
+  FOCALFLEET_TRY_ASSIGN(Layout whole, LoadLayout(config.fleet));
+  if (!config.sector.present()) return whole;
+  const auto buses = ParseRanges(config.sector.buses);
+  if (!buses) return Fail(ErrorCode::kInvalid, config.sector.buses_at + ": " + buses.error().text);
+  std::vector<std::uint8_t> own(whole.size(), 0);
+  for (const std::uint32_t bus : *buses) {
+    if (!std::ranges::binary_search(whole.buses(), BusId{bus}))
+      return Fail(ErrorCode::kInvalid, config.sector.buses_at + ": bus " + std::to_string(bus) +
+                                           " is not in " + config.fleet.units);
+    for (std::uint32_t n = 0; n < whole.size(); ++n)
+      if (whole.units()[n].bus == BusId{bus}) own[n] = 1;
+  }
+  std::vector<PositionerIndex> chosen;
+  for (std::uint32_t n = 0; n < whole.size(); ++n)
+    if (own[n] != 0) chosen.push_back({n});
+  return whole.Part(chosen);
 }
 
 Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera) {

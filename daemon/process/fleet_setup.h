@@ -20,6 +20,10 @@ namespace focalfleet {
 /// Errors: kUnavailable: a file cannot be read; kInvalid with file:line.
 Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet);
 
+/// The layout of this daemon: that of the units file, or of its sector's buses in it. Errors: as
+/// LoadLayout; kInvalid with file:line: a bus that the units file has not.
+Result<Layout> LoadOwnLayout(const DaemonConfig& config);
+
 /// The configured camera with its fiducials. Pre: a camera is configured. Errors: as LoadLayout.
 Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera);
 

@@ -52,6 +52,12 @@ Result<std::unique_ptr<journal::JournalThread>> OpenJournal(const DaemonConfig& 
       std::move(life));
 }
 
+std::function<void(const Inputs&, const Effects&)> Journalling(journal::JournalThread* journal) {
+  return [journal](const Inputs& inputs, const Effects& effects) {
+    if (journal != nullptr) journal->Take(inputs, effects);
+  };
+}
+
 int ReplayAndPrint(const std::string& path) {
   const bool shown = ::isatty(STDERR_FILENO) != 0;
   const std::string own = BuildVersion();

@@ -23,6 +23,9 @@ Result<std::unique_ptr<journal::JournalThread>> OpenJournal(const DaemonConfig& 
                                                             const StoredFleet& stored,
                                                             std::function<void(ShellNote)> note);
 
+/// Gives each step to the journal, which outlives the function; null: to none.
+std::function<void(const Inputs&, const Effects&)> Journalling(journal::JournalThread* journal);
+
 /// Replays a life and prints what it found. Returns the exit code: 0: every step decided as
 /// recorded; 1: one did not, or the journal cannot be read.
 int ReplayAndPrint(const std::string& path);

@@ -7,14 +7,16 @@
 namespace focalfleet {
 namespace {
 
-void OpenPublisher(const DaemonConfig::Dds& dds, StatusOutput* out) {
+void OpenPublisher(const DaemonConfig& config, StatusOutput* out) {
+  const DaemonConfig::Dds& dds = config.dds;
   DdsTroubles* const troubles = out->troubles.get();
   out->publisher = std::make_unique<RenewingStatusPublisher>(RenewingStatusPublisher::Options{
-      .join = {.join = [options = DdsOptionsOf(dds)] { return StatusPublisher::Create(options); },
-               .tell =
-                   [troubles](const std::string& trouble) {
-                     troubles->Report(AlarmName::kDdsMissing, "status", trouble);
-                   }},
+      .join = {
+          .join = [options = StatusOptionsOf(config)] { return StatusPublisher::Create(options); },
+          .tell =
+              [troubles](const std::string& trouble) {
+                troubles->Report(AlarmName::kDdsMissing, "status", trouble);
+              }},
       .renews = !dds.security.empty()});
 }
 
@@ -29,7 +31,7 @@ bool StatusOutput::Report(const AuditHead& head) const {
 void OpenStatusOutput(const DaemonConfig& config, const Layout& layout, WallTime started,
                       const HostClock& clock, StatusOutput* out) {
   if (config.dds.enabled || config.camera.dds) WarnOfDdsEnvironment(config.dds);
-  if (config.dds.enabled) OpenPublisher(config.dds, out);
+  if (config.dds.enabled) OpenPublisher(config, out);
   if (config.http.port != 0)
     out->page = std::make_unique<PlateFeed>(
         PlateFeed::Options{.layout = &layout, .viewers_max = config.http.viewers_max});

@@ -43,6 +43,35 @@ TEST(Config, DefaultsAreTheDocumentedOnes) {
   EXPECT_EQ(config->timing.reply_wait, CoordinatorConfig{}.reply_wait);
 }
 
+TEST(Config, APlaneAndItsSectorsAreRead) {
+  const auto plane =
+      ParseConfig("[plane]\nsectors = [\"0-12\", \"13,14\"]\n[bus]\nunix_directory = \"d\"\n",
+                  "/etc/ff/p.toml");
+  ASSERT_TRUE(plane) << plane.error().text;
+  EXPECT_TRUE(plane->plane.coordinates());
+  EXPECT_EQ(plane->plane.sectors, (std::vector<std::string>{"0-12", "13,14"}));
+  EXPECT_EQ(plane->plane.sectors_at, "/etc/ff/p.toml:2");
+  EXPECT_FALSE(plane->timing.in_plane);
+  const auto sector = ParseConfig(
+      "[sector]\nbuses = \"13,14\"\nnumber = 1\n[bus]\nunix_directory = \"d\"\n", "/etc/ff/s.toml");
+  ASSERT_TRUE(sector) << sector.error().text;
+  EXPECT_TRUE(sector->sector.present());
+  EXPECT_EQ(sector->sector.buses, "13,14");
+  EXPECT_EQ(sector->sector.number, 1u);
+  EXPECT_TRUE(sector->timing.in_plane);
+}
+
+TEST(Config, APlaneNeedsDdsAndOneRoleADaemon) {
+  for (const char* text :
+       {"[plane]\nsectors = [\"0\"]\n[sector]\nbuses = \"0\"\n",
+        "[sector]\nbuses = \"0\"\n[dds]\nenabled = false\n",
+        "[plane]\nsectors = [\"0\"]\n[dds]\nenabled = false\n",
+        "[sector]\nbuses = \"0\"\nnumber = 64\n",
+        "[sector]\nbuses = \"0\"\n[camera]\ndirectory = \"c\"\nfiducials = \"f\"\n"})
+    EXPECT_FALSE(ParseConfig(std::string(text) + "[bus]\nunix_directory = \"d\"\n", "/p.toml"))
+        << text;
+}
+
 TEST(Config, EveryKeyIsRead) {
   const auto config = ParseConfig(R"(
 [fleet]

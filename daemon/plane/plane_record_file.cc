@@ -1,0 +1,102 @@
+#include "daemon/plane/plane_record_file.h"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "daemon/files/text_file.h"
+#include "protocol/base/limits.h"
+
+namespace focalfleet {
+namespace {
+
+using nlohmann::json;
+
+json JsonOf(const PlaneConfiguration& configuration, const Layout& layout) {
+  json targets = json::array();
+  for (std::uint32_t n = 0; n < configuration.targets.size(); ++n) {
+    if (!configuration.targets[n]) continue;
+    const Pose& pose = *configuration.targets[n];
+    const bool named = !configuration.target_ids.empty();
+    targets.push_back({layout.units()[n].id.value, pose[0], pose[1],
+                       named ? configuration.target_ids[n] : std::string()});
+  }
+  return {{"id", configuration.id},
+          {"source", configuration.source},
+          {"fixed", configuration.fixed},
+          {"targets", std::move(targets)}};
+}
+
+tl::unexpected<Error> Bad(const std::string& path, const std::string& why) {
+  return Fail(ErrorCode::kInvalid, path + ": this is no record of a plane: " + why);
+}
+
+Result<PlaneConfiguration> ConfigurationOf(const json& from, const std::string& path,
+                                           const Layout& layout) {
+  if (!from.is_object() || !from["id"].is_number_unsigned() || !from["source"].is_string() ||
+      !from["fixed"].is_boolean() || !from["targets"].is_array())
+    return Bad(path, "the configuration under way");
+  PlaneConfiguration configuration{.id = from["id"].get<std::uint64_t>(),
+                                   .source = from["source"].get<std::string>(),
+                                   .fixed = from["fixed"].get<bool>()};
+  configuration.targets.resize(layout.size());
+  configuration.target_ids.resize(layout.size());
+  for (const json& row : from["targets"]) {
+    if (!row.is_array() || row.size() != 4 || !row[0].is_number_unsigned() ||
+        !row[1].is_number_integer() || !row[2].is_number_integer() || !row[3].is_string())
+      return Bad(path, "a target");
+    const auto unit = layout.Find(UnitId{row[0].get<std::uint32_t>()});
+    const std::int64_t theta = row[1].get<std::int64_t>(), phi = row[2].get<std::int64_t>();
+    if (!unit || std::abs(theta) > limits::kPositionMax || std::abs(phi) > limits::kPositionMax)
+      return Bad(path, "a target of a unit that the units file has not, or beyond all ranges");
+    configuration.targets[unit->value] =
+        Pose{static_cast<std::int32_t>(theta), static_cast<std::int32_t>(phi)};
+    configuration.target_ids[unit->value] = row[3].get<std::string>();
+  }
+  return configuration;
+}
+
+Result<PlaneRecordFile::Content> Parse(const std::string& text, const std::string& path,
+                                       const Layout& layout) {
+  json read = json::parse(text, nullptr, false);
+  if (!read.is_object()) return Bad(path, "it is no JSON object");
+  for (const char* key : {"coordinator", "epoch", "next_configuration"})
+    if (!read[key].is_number_unsigned()) return Bad(path, key);
+  PlaneRecordFile::Content content{.coordinator = read["coordinator"].get<std::uint64_t>(),
+                                   .record = {}};
+  content.record.epoch = {read["epoch"].get<std::uint64_t>(), content.coordinator};
+  content.record.next_configuration = read["next_configuration"].get<std::uint64_t>();
+  if (!read["under_way"].is_null()) {
+    FOCALFLEET_TRY_ASSIGN(content.record.under_way,
+                          ConfigurationOf(read["under_way"], path, layout));
+  }
+  return content;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<PlaneRecordFile>> PlaneRecordFile::Open(const std::string& path,
+                                                               const Layout& layout,
+                                                               std::uint64_t otherwise) {
+  std::unique_ptr<PlaneRecordFile> file(new PlaneRecordFile(path, &layout));
+  FOCALFLEET_TRY_ASSIGN(file->lock_, store_internal::LockFile::Acquire(path + ".lock"));
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) {
+    file->content_.coordinator = otherwise;
+    FOCALFLEET_TRY(file->Keep({}));
+    return file;
+  }
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
+  FOCALFLEET_TRY_ASSIGN(file->content_, Parse(text, path, layout));
+  return file;
+}
+
+Status PlaneRecordFile::Keep(const PlaneRecord& record) const {
+  const json written{{"coordinator", content_.coordinator},
+                     {"epoch", record.epoch.number},
+                     {"next_configuration", record.next_configuration},
+                     {"under_way", record.under_way ? JsonOf(*record.under_way, layout_) : json()}};
+  return WriteFileAtomically(path_, written.dump() + "\n");
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,261 @@
+#include "daemon/plane/plane_requests.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "daemon/access/rights.h"
+#include "daemon/usage/build_version.h"
+#include "fleet/files/line_limit.h"
+#include "fleet/files/targets_file.h"
+#include "fleet/targets.h"
+
+namespace focalfleet {
+namespace {
+
+Json SectorJson(const PlaneInstant& plane, std::uint32_t sector) {
+  const SectorBook& book = plane.coordinator->sectors();
+  const SectorBook::Entry& entry = book[sector];
+  Json json{{"sector", sector},
+            {"units", entry.units},
+            {"heard", book.IsHeard(sector)},
+            {"trouble", entry.trouble}};
+  const auto clock = entry.clock.At(plane.now);
+  json["clock_bound_ms"] = clock ? Json(clock->bound.seconds() * 1e3) : Json();
+  json["clock_ahead_s"] = clock ? Json(clock->ahead.seconds()) : Json();
+  if (!entry.report) return json;
+  json["stage"] = Name(entry.report->stage);
+  json["life"] = entry.report->incarnation;
+  json["configuration"] = entry.report->configuration.number;
+  json["arrived"] = entry.report->counts.arrived;
+  json["targeted"] = entry.report->counts.targeted;
+  json["last_word"] = entry.report->trouble;
+  return json;
+}
+
+Json GuaranteeJson(const PlaneView& view) {
+  Json pairs = Json::array();
+  for (const UnnoticedPair& pair : view.unnoticed)
+    pairs.push_back(
+        {{"ends", pair.ends.value}, {"follower", pair.follower.value}, {"at_s", pair.at_s}});
+  return {{"follows_beyond", view.follows_beyond}, {"unnoticed", std::move(pairs)}};
+}
+
+Json ProgressJson(const PlaneInstant& plane) {
+  const PlaneView& view = plane.coordinator->view();
+  const OutcomeCounts& counts = view.counts;
+  return {{"id", view.configuration},
+          {"kind", "apply"},
+          {"state", Name(view.state)},
+          {"round", view.rounds},
+          {"targeted", counts.targeted},
+          {"arrived", counts.arrived},
+          {"refused", counts.refused},
+          {"failed", counts.failed},
+          {"stopped", counts.stopped},
+          {"unmeasured", counts.unmeasured},
+          {"makespan_predicted_s", Number(view.makespan_predicted_s)},
+          {"waiting_for", view.waiting_for},
+          {"fraction", counts.targeted == 0 ? 0.0 : double(counts.arrived) / counts.targeted}};
+}
+
+/// Places and drives of all units as their sectors last reported them.
+struct Standing {
+  std::vector<UnitKnowledge> places;
+  std::vector<UnitDrive> drives;
+  std::vector<std::uint8_t> known;
+};
+
+Standing StandingOf(const PlaneInstant& plane) {
+  Standing standing;
+  const std::size_t units = plane.plane->layout().size();
+  standing.places.resize(units);
+  standing.drives.resize(units);
+  standing.known.resize(units);
+  for (std::uint32_t n = 0; n < units; ++n) {
+    const SectorBook::Entry& entry = plane.coordinator->sectors()[plane.plane->SectorOf({n})];
+    if (entry.places == nullptr) continue;
+    const std::uint32_t local = plane.plane->Local({n}).value;
+    standing.places[n] = entry.places->places[local];
+    standing.drives[n] = entry.places->drives[local];
+    standing.known[n] = 1;
+  }
+  return standing;
+}
+
+Result<PlaneApplyCommand> ApplyOf(const PlaneInstant& plane, const Json& args) {
+  for (const char* name : {"corrections", "observe"})
+    if (args.contains(name))
+      return Fail(ErrorCode::kRefused,
+                  "a plane is not measured: each sector's daemon has the "
+                  "sensors of its own units alone");
+  PlaneApplyCommand command;
+  FOCALFLEET_TRY_ASSIGN(command.source, TextArgumentOr(args, "source", "targets"));
+  FOCALFLEET_TRY_ASSIGN(command.fixed, FlagArgumentOr(args, "fixed", false));
+  FOCALFLEET_TRY_ASSIGN(const std::string csv,
+                        TextArgument(args, "targets_csv", kControlLineBytesMax));
+  FOCALFLEET_TRY(CheckLines(csv, command.source, std::size_t{2} * limits::kUnits));
+  FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(csv, command.source));
+  const Layout& layout = plane.plane->layout();
+  const Standing standing = StandingOf(plane);
+  command.target_ids.resize(layout.size());
+  for (const TargetRow& row : targets.rows) {
+    const auto i = layout.Find(row.unit);
+    if (!i) continue;  // ResolveTargets names it
+    command.target_ids[i->value] = row.target_id;
+    if (standing.known[i->value] == 0)
+      return Fail(ErrorCode::kRefused,
+                  "unit " + std::to_string(row.unit.value) + " is of " +
+                      NameOfSector(plane.plane->SectorOf(*i)) +
+                      ", which has not been heard since this coordinator started: its units' "
+                      "drives are not known");
+  }
+  FOCALFLEET_TRY_ASSIGN(command.targets,
+                        ResolveTargets(targets, layout, standing.drives, standing.places));
+  return command;
+}
+
+}  // namespace
+
+Json PlaneConfigurationJson(const PlaneInstant& plane) {
+  const PlaneView& view = plane.coordinator->view();
+  Json json = ProgressJson(plane);
+  json["source"] = view.source;
+  const OutcomeCounts& c = view.counts;
+  const std::uint32_t counted = c.arrived + c.refused + c.failed + c.stopped + c.unmeasured;
+  json["left_out"] = c.targeted > counted ? c.targeted - counted : 0;
+  json["guarantee"] = GuaranteeJson(view);
+  return json;
+}
+
+Json PlaneStatusJson(const PlaneInstant& plane) {
+  const PlaneView& view = plane.coordinator->view();
+  Json sectors = Json::array();
+  for (std::uint32_t n = 0; n < plane.coordinator->sectors().size(); ++n)
+    sectors.push_back(SectorJson(plane, n));
+  return {{"version", BuildVersion()},
+          {"units", plane.plane->layout().size()},
+          {"busy", plane.coordinator->busy()},
+          {"plane",
+           {{"phase", Name(view.phase)},
+            {"epoch", view.epoch.number},
+            {"waiting_for", view.waiting_for},
+            {"sectors", std::move(sectors)},
+            {"messages",
+             {{"sent", plane.link.sent},
+              {"sent_bytes", plane.link.sent_bytes},
+              {"received", plane.link.received},
+              {"received_bytes", plane.link.received_bytes},
+              {"refused", plane.link.refused}}}}},
+          {"configuration", PlaneConfigurationJson(plane)}};
+}
+
+void PlaneRequests::Service(const PlaneInstant& plane, std::vector<PlaneCommand>* commands) {
+  std::vector<IncomingLine> stops;
+  server_->Service(&stops);
+  for (const IncomingLine& line : stops) Handle(plane, line, commands);
+  for (int n = 0; n < 16; ++n) {  // stops that come meanwhile wait no longer than these
+    const auto line = server_->Next();
+    if (!line) return;
+    Handle(plane, *line, commands);
+  }
+}
+
+void PlaneRequests::Handle(const PlaneInstant& plane, const IncomingLine& line,
+                           std::vector<PlaneCommand>* commands) {
+  const auto request = DecodeRequest(line.text);
+  Pending pending{.client = line.client, .id = request ? request->id : 0};
+  const auto refuse = [&](Error error) {
+    Answer(pending, tl::unexpected<Error>(std::move(error)));
+  };
+  if (!request) return refuse(request.error());
+  const std::string& verb = request->verb;
+  if (line.reserved && verb != "stop")
+    return refuse({ErrorCode::kFull, "too many clients, only stop is taken"});
+  if (const Status allowed = CheckRight(line.caller, verb, request->args); !allowed) {
+    options_.log(verb + " refused: " + allowed.error().text);
+    return refuse(allowed.error());
+  }
+  if (verb == "access") return Answer(pending, AccessJson(line.caller));
+  if (verb == "status") return Answer(pending, PlaneStatusJson(plane));
+  if (verb == "wait") {
+    if (!plane.coordinator->busy()) return Answer(pending, Json{{"under_way", false}});
+    pending.wait = pending.apply = true;
+    pending_.emplace(next_++, pending);
+    return;
+  }
+  if (verb == "stop") {
+    if (request->args.contains("unit_id"))
+      return refuse({ErrorCode::kRefused, "a unit is stopped by the daemon of its sector"});
+    options_.log("stop commanded by " + Describe(line.caller));
+    commands->push_back({next_, PlaneStopCommand{}});
+    pending_.emplace(next_++, pending);
+    return;
+  }
+  if (verb != "apply")
+    return refuse({ErrorCode::kRefused,
+                   verb + " is no verb of a plane's coordinator: ask the daemon of the sector"});
+  if (line.overtaken)
+    return refuse({ErrorCode::kRefused,
+                   "a stop that came before apply was begun went ahead of it; "
+                   "command it again if it is still wanted"});
+  const auto wait = FlagArgumentOr(request->args, "wait", false);
+  if (!wait) return refuse(wait.error());
+  auto apply = ApplyOf(plane, request->args);
+  if (!apply) {
+    options_.log("apply refused: " + apply.error().text);
+    return refuse(apply.error());
+  }
+  options_.log("apply commanded by " + Describe(line.caller));
+  pending.wait = *wait;
+  pending.apply = true;
+  commands->push_back({next_, std::move(*apply)});
+  pending_.emplace(next_++, pending);
+}
+
+void PlaneRequests::Answer(const Pending& pending, const Result<Json>& result) {
+  server_->Answer(pending.client, result ? EncodeResult(pending.id, *result)
+                                         : EncodeError(pending.id, result.error()));
+}
+
+void PlaneRequests::Reply(const PlaneInstant& plane, const ReplyEffect& reply) {
+  const auto it = pending_.find(reply.request);
+  if (it == pending_.end()) return;
+  const Pending pending = it->second;
+  if (reply.error) {
+    Answer(pending, tl::unexpected<Error>(*reply.error));
+  } else if (!pending.apply) {
+    Answer(pending, Json{{"text", reply.text}});
+  } else if (!pending.wait || reply.last) {
+    Answer(pending, PlaneConfigurationJson(plane));
+  } else {
+    return;
+  }
+  pending_.erase(it);
+}
+
+void PlaneRequests::ShowProgress(const PlaneInstant& plane) {
+  if (pending_.empty() || plane.now < progress_at_) return;
+  progress_at_ = plane.now + options_.progress_period;
+  const Json progress = ProgressJson(plane);
+  std::erase_if(pending_, [&](const auto& entry) {
+    const Pending& pending = entry.second;
+    if (!pending.wait) return false;
+    if (!plane.coordinator->busy()) {
+      Answer(pending, PlaneConfigurationJson(plane));
+      return true;
+    }
+    return !server_->Progress(pending.client, EncodeProgress(pending.id, progress));
+  });
+}
+
+void PlaneRequests::Close() {
+  for (const auto& [number, pending] : pending_)
+    Answer(pending,
+           Fail(ErrorCode::kUnavailable, "this coordinator ends; the sectors hold what they have"));
+  pending_.clear();
+  std::vector<IncomingLine> rest;
+  server_->Service(&rest);
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,68 @@
+// The requests of the control socket of a plane's coordinator: status, apply, stop, wait, access.
+// They are those of a daemon of its own, for the whole plane; all other verbs are a sector's affair
+// and are asked of its own daemon.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "daemon/control/line_exchange.h"
+#include "daemon/control/messages.h"
+#include "daemon/plane/plane_link.h"
+#include "fleet/plane/plane_coordinator.h"
+
+namespace focalfleet {
+
+/// The coordinator at an instant.
+struct PlaneInstant {
+  const PlaneLayout* plane = nullptr;
+  const PlaneCoordinator* coordinator = nullptr;
+  HostInstant now;
+  PlaneLinkCounters link;
+};
+
+/// The configuration under way, or the last one; docs/plane.md has the members.
+Json PlaneConfigurationJson(const PlaneInstant& plane);
+Json PlaneStatusJson(const PlaneInstant& plane);
+
+class PlaneRequests {
+ public:
+  struct Options {
+    DurationNs progress_period = Milliseconds(200);
+    std::function<void(const std::string&)> log;  // one sentence for each command
+  };
+  PlaneRequests(std::unique_ptr<LineExchange> server, Options options)
+      : server_(std::move(server)), options_(std::move(options)) {}
+
+  [[nodiscard]] int fd() const { return server_->fd(); }
+  /// A turn: requests are read, questions answered, commands appended. Stops come first.
+  void Service(const PlaneInstant& plane, std::vector<PlaneCommand>* commands);
+  void Reply(const PlaneInstant& plane, const ReplyEffect& reply);
+  /// Clients that wait receive progress, or the end that they wait for.
+  void ShowProgress(const PlaneInstant& plane);
+  [[nodiscard]] HostInstant wake_at() const { return pending_.empty() ? kNever : progress_at_; }
+  void Close();
+
+ private:
+  struct Pending {
+    ClientId client = 0;
+    std::uint64_t id = 0;
+    bool wait = false;
+    bool apply = false;
+  };
+  void Handle(const PlaneInstant& plane, const IncomingLine& line,
+              std::vector<PlaneCommand>* commands);
+  void Answer(const Pending& pending, const Result<Json>& result);
+
+  std::unique_ptr<LineExchange> server_;
+  Options options_;
+  std::unordered_map<std::uint64_t, Pending> pending_;  // by the number of the command
+  std::uint64_t next_ = 1;
+  HostInstant progress_at_{0};
+};
+
+}  // namespace focalfleet

@@ -1,0 +1,231 @@
+#include "daemon/process/plane_daemon.h"
+
+#include <poll.h>
+#include <signal.h>
+#include <spdlog/spdlog.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <memory>
+#include <random>
+#include <utility>
+
+#include "daemon/clock/clock.h"
+#include "daemon/control/id_ranges.h"
+#include "daemon/loop/event_loop.h"
+#include "daemon/loop/job_thread.h"
+#include "daemon/plane/plane_link.h"
+#include "daemon/plane/plane_record_file.h"
+#include "daemon/plane/plane_requests.h"
+#include "daemon/process/control_door.h"
+#include "daemon/process/dds_setup.h"
+#include "daemon/process/fleet_setup.h"
+#include "daemon/process/sector_setup.h"
+#include "daemon/systemd/notify_socket.h"
+
+namespace focalfleet {
+namespace {
+
+struct KeepJob {
+  PlaneRecord record;
+  std::uint64_t number = 0;
+};
+struct KeptRecord {
+  std::uint64_t number = 0;
+  Status status;
+};
+using Planner = JobThread<PlaneJob, PlanePlanDone>;
+using Keeper = JobThread<KeepJob, KeptRecord>;
+
+std::uint64_t RandomNumber() {
+  std::random_device chance;
+  return (std::uint64_t{chance()} << 31 | chance()) + 1;
+}
+
+class PlaneDaemon {
+ public:
+  explicit PlaneDaemon(const DaemonConfig& config) : config_(config), clock_(config.clock.speed) {}
+
+  Status Start();
+  void Run();
+
+ private:
+  void Turn();
+  void Wait();
+  void Perform(PlaneEffects* effects);
+  void TakeKept();
+  [[nodiscard]] PlaneInstant Instant() const {
+    return {plane_.get(), coordinator_.get(), now_, link_->counters()};
+  }
+
+  DaemonConfig config_;
+  HostClock clock_;
+  std::unique_ptr<PlaneLayout> plane_;
+  std::unique_ptr<PlaneRecordFile> record_;
+  std::unique_ptr<EventSignal> signal_;
+  std::unique_ptr<PlaneCoordinator> coordinator_;
+  std::unique_ptr<PlaneRequests> requests_;
+  std::unique_ptr<PlaneLink> link_;
+  std::unique_ptr<Planner> planner_;
+  std::unique_ptr<Keeper> keeper_;
+  KeepJob keeping_;
+  std::uint64_t kept_ = 0;
+  HostInstant keep_again_at_ = kNever;
+  HostInstant now_;
+  HostInstant wake_at_{0};
+  NotifySocket service_;
+  int signals_ = -1;
+  bool ending_ = false;
+};
+
+Status PlaneDaemon::Start() {
+  FOCALFLEET_TRY_ASSIGN(PlaneLayout plane, LoadPlane(config_));
+  plane_ = std::make_unique<PlaneLayout>(std::move(plane));
+  FOCALFLEET_TRY_ASSIGN(
+      record_, PlaneRecordFile::Open(config_.store.path, plane_->layout(), RandomNumber()));
+  FOCALFLEET_TRY_ASSIGN(LineServer server, OpenControl(config_.control));
+  requests_ = std::make_unique<PlaneRequests>(
+      std::make_unique<LineServer>(std::move(server)),
+      PlaneRequests::Options{.progress_period = clock_.Real(Milliseconds(200)),
+                             .log = [](const std::string& text) { spdlog::info("{}", text); }});
+  FOCALFLEET_TRY_ASSIGN(EventSignal signal, EventSignal::Create());
+  signal_ = std::make_unique<EventSignal>(std::move(signal));
+  FOCALFLEET_TRY_ASSIGN(keeper_, Keeper::Create(
+                                     [record = record_.get()](const KeepJob& job, const auto&) {
+                                       return KeptRecord{job.number, record->Keep(job.record)};
+                                     },
+                                     signal_.get(), {.name = "record"}));
+  FOCALFLEET_TRY_ASSIGN(
+      planner_, Planner::Create(
+                    [plane = plane_.get()](const PlaneJob& job, const std::atomic<bool>& ending) {
+                      return RunPlaneJob(job, *plane, [&ending] { return ending.load(); });
+                    },
+                    signal_.get(), {.name = "planner"}));
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int number : {SIGTERM, SIGINT}) sigaddset(&set, number);
+  signals_ = ::signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
+  if (signals_ < 0) return Fail(ErrorCode::kUnavailable, "no descriptors left");
+  const PlaneRecordFile::Content& content = record_->content();
+  coordinator_ = std::make_unique<PlaneCoordinator>(plane_.get(), PlaneTimesAt(config_.clock.speed),
+                                                    content.coordinator, content.record);
+  WarnOfDdsEnvironment(config_.dds);
+  link_ = std::make_unique<PlaneLink>(PlaneLink::Options{
+      .dds = DdsOptionsOf(config_.dds),
+      .sector = {},
+      .arrived = [signal_raw = signal_.get()] { signal_raw->Raise(); },
+      .tell =
+          [](const std::string& trouble) {
+            if (trouble.empty())
+              spdlog::info("the domain is joined");
+            else
+              spdlog::error("no sector can be heard, it is tried again: {}", trouble);
+          }});
+  spdlog::info("coordinator of a plane of {} units in {} sectors", plane_->layout().size(),
+               plane_->sectors());
+  return {};
+}
+
+void PlaneDaemon::Run() {
+  service_ = NotifySocket::FromEnvironment(&std::getenv);
+  static_cast<void>(service_.Send("READY=1"));
+  while (!ending_) {
+    Turn();
+    Wait();
+  }
+  static_cast<void>(service_.Send("STOPPING=1"));
+  requests_->Close();
+  link_.reset();
+}
+
+void PlaneDaemon::TakeKept() {
+  while (const auto kept = keeper_->Take()) {
+    if (kept->status) {
+      kept_ = kept->number;
+      continue;
+    }
+    spdlog::error("the record of the plane cannot be written, it is tried again: {}",
+                  kept->status.error().text);
+    keep_again_at_ = now_ + clock_.Real(Seconds(1));
+  }
+  if (now_ < keep_again_at_) return;
+  KeepJob again = keeping_;
+  if (keeper_->Submit(&again)) keep_again_at_ = kNever;
+}
+
+void PlaneDaemon::Turn() {
+  now_ = clock_.Now();
+  signal_->Clear();
+  TakeKept();
+  std::vector<PlanePlanDone> plans;
+  while (auto plan = planner_->Take()) plans.push_back(std::move(*plan));
+  const PlaneMail mail = link_->Take();
+  std::vector<PlaneCommand> commands;
+  requests_->Service(Instant(), &commands);
+  PlaneEffects effects;
+  coordinator_->Step(
+      {.now = now_, .reports = mail.reports, .commands = commands, .plans = plans, .kept = kept_},
+      &effects);
+  Perform(&effects);
+  requests_->ShowProgress(Instant());
+  wake_at_ = std::min({effects.wake_at, requests_->wake_at(), keep_again_at_});
+}
+
+void PlaneDaemon::Perform(PlaneEffects* effects) {
+  for (const std::string& line : effects->log) spdlog::info("{}", line);
+  for (const PlaneOrder& order : effects->orders) link_->Send(order);
+  if (effects->record) {
+    keeping_ = {std::move(*effects->record), effects->record_number};
+    KeepJob job = keeping_;
+    if (!keeper_->Submit(&job)) keep_again_at_ = now_;
+  }
+  if (effects->job) {
+    PlaneJob job = std::move(*effects->job);
+    if (!planner_->Submit(&job)) spdlog::error("the planner's thread has no room");
+  }
+  for (const ReplyEffect& reply : effects->replies) requests_->Reply(Instant(), reply);
+}
+
+void PlaneDaemon::Wait() {
+  const std::int64_t left_ns =
+      wake_at_ == kNever ? 1'000'000'000 : clock_.ToMonotonic(wake_at_) - ReadMonotonicNs();
+  const std::int64_t ms = std::clamp<std::int64_t>((left_ns + 999'999) / 1'000'000, 0, 1000);
+  std::array<pollfd, 3> fds{
+      {{requests_->fd(), POLLIN, 0}, {signal_->fd(), POLLIN, 0}, {signals_, POLLIN, 0}}};
+  ::poll(fds.data(), fds.size(), static_cast<int>(ms));
+  signalfd_siginfo info{};
+  if (::read(signals_, &info, sizeof info) == sizeof info) {
+    spdlog::info("ending; what moves finishes, and the sectors hold what they have");
+    ending_ = true;
+  }
+}
+
+}  // namespace
+
+Result<PlaneLayout> LoadPlane(const DaemonConfig& config) {
+  FOCALFLEET_TRY_ASSIGN(Layout layout, LoadLayout(config.fleet));
+  std::vector<std::vector<BusId>> sectors;
+  for (const std::string& text : config.plane.sectors) {
+    const auto numbers = ParseRanges(text);
+    if (!numbers)
+      return Fail(ErrorCode::kInvalid, config.plane.sectors_at + ": " + numbers.error().text);
+    std::vector<BusId>& buses = sectors.emplace_back();
+    for (const std::uint32_t number : *numbers) buses.push_back({number});
+  }
+  auto plane = PlaneLayout::Create(std::move(layout), std::move(sectors));
+  if (!plane) return Fail(plane.error().code, config.plane.sectors_at + ": " + plane.error().text);
+  return plane;
+}
+
+Status RunPlane(const DaemonConfig& config) {
+  EventLoop::BlockSignals();
+  PlaneDaemon daemon(config);
+  FOCALFLEET_TRY(daemon.Start());
+  daemon.Run();
+  return {};
+}
+
+}  // namespace focalfleet
