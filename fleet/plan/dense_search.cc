@@ -19,7 +19,6 @@ namespace {
 
 constexpr double kStepDeg = 6;          // that the quickest unit turns in one step
 constexpr std::size_t kChosenMost = 8;  // units that are planned anew together
-constexpr std::int32_t kBold = 3;       // what a step costs in which others are met
 constexpr int kUnitsPerRepair = 2;      // of the first plan, until more time is allowed
 constexpr int kRepairsAtLeast = 100;
 constexpr std::int32_t kExtendBy = 6;  // the time grows by this part of it
@@ -36,7 +35,7 @@ constexpr int kRepairsWithNotice = 12;  // then a pair need not be clear with no
 /// A pair that fails so often weighs one conflict more (breakout local search, Morris 1993).
 constexpr int kFailuresPerWeight = 6;
 /// Cost of work, in seconds of CPU.
-constexpr double kExpansionCost_s = 0.6e-6;
+constexpr double kWordCost_s = 2e-9;
 constexpr double kReplanCost_s = 150e-6;
 constexpr double kJointStepCost_s = 0.8e-6;
 
@@ -96,7 +95,7 @@ class DenseSearch {
     const auto it = failures_.find(pair);
     return 1 + (it == failures_.end() ? 0 : it->second / kFailuresPerWeight);
   }
-  [[nodiscard]] int ConflictsOfChosen() const;
+  [[nodiscard]] int ConflictsOfChosen();
   bool Repair(const Pair& pair);
   bool PlanChosen(std::size_t planned, bool ok);
   bool RepairAll(int repairs_most);
@@ -108,7 +107,7 @@ class DenseSearch {
   }
   [[nodiscard]] double End() const;
   [[nodiscard]] double Work_s() const {
-    return static_cast<double>(search_.expansions()) * kExpansionCost_s +
+    return static_cast<double>(search_.work()) * kWordCost_s +
            static_cast<double>(replans_) * kReplanCost_s +
            static_cast<double>(joint_.work()) * kJointStepCost_s;
   }
@@ -145,7 +144,7 @@ void DenseSearch::UpdateConflicts(std::uint32_t unit) {
     const Pair pair = std::minmax(unit, scene_.neighbours(unit)[slot].unit);
     // A unit may be without a way: limits of power, or nobody wants the plan any more.
     const bool has_way = !motions_.track(unit).legs().empty();
-    if (has_way && motions_.Meets(unit, motions_.track(unit), slot))
+    if (has_way && motions_.Meet(unit, slot))
       conflicts_.insert(pair);
     else
       conflicts_.erase(pair);
@@ -182,25 +181,21 @@ bool DenseSearch::Replan(std::uint32_t unit) {
                          motions_.ToleranceOf(unit, slot)});
   }
   FindRests({&unit, 1});
-  SoftSearch::Question question{.arm = &scene_.arm(unit),
-                                .drive = &q_.drives[unit],
-                                .around = &around_[0],
-                                .moving = moving_,
-                                .steps = occupancy_.steps(),
-                                .from = q_.from[unit],
-                                .to = q_.to[unit],
-                                .within = RangeAround(scene_.arm(unit), q_.from[unit]),
-                                .end_step = end_step_,
-                                .rests = rests_};
-  auto found = search_.Find(question);
-  if (!found) {
-    // Where all ways meet others, the search among them has no end: a bold one has.
-    question.meets_cost = kBold;
-    found = search_.Find(question);
-  }
+  const StepQuestion question{.arm = &scene_.arm(unit),
+                              .drive = &q_.drives[unit],
+                              .around = &around_[0],
+                              .moving = moving_,
+                              .standing = scene_.standing(unit),
+                              .steps = occupancy_.steps(),
+                              .from = q_.from[unit],
+                              .to = q_.to[unit],
+                              .within = RangeAround(scene_.arm(unit), q_.from[unit]),
+                              .end_step = end_step_,
+                              .rests = rests_};
+  const auto found = search_.Find(question, false);
   if (!found || !motions_.KeepsLimits(unit, found->paths)) return false;
   Set(unit, found->paths);
-  return motions_.Cost(unit, motions_.track(unit), Motions::kNever) != Motions::kNever;
+  return !motions_.MeetsForGood(unit);
 }
 
 /// Pre: the units are taken out; all are neighbours of each other.
@@ -231,14 +226,13 @@ bool DenseSearch::ReplanTogether(std::span<const std::uint32_t> units) {
   for (std::size_t m = 0; m < units.size(); ++m) {
     if (!motions_.KeepsLimits(units[m], found->paths[m])) return false;
     Set(units[m], found->paths[m]);
-    if (motions_.Cost(units[m], motions_.track(units[m]), Motions::kNever) == Motions::kNever)
-      return false;
+    if (motions_.MeetsForGood(units[m])) return false;
   }
   // The members keep to one clock: they are clear of each other, but perhaps not with notice.
   for (std::size_t m = 0; m < units.size(); ++m)
     for (std::size_t other = 0; other < m; ++other)
       if (const std::uint32_t slot = motions_.SlotOf(units[m], units[other]);
-          motions_.Meets(units[m], motions_.track(units[m]), slot))
+          motions_.Meet(units[m], slot))
         motions_.GiveUpNotice(units[m], slot);
   return true;
 }
@@ -259,11 +253,16 @@ void DenseSearch::Begin() {
       order.emplace_back(-Straight(q_.drives[i], q_.from[i], q_.to[i]).end_s, i);
   }
   std::sort(order.begin(), order.end());
+  // Where a unit still has no way of its own, others expect it on its straight one.
   for (const auto& [end, i] : order) {
-    if (IsAbandoned(q_.abandoned) || Replan(i)) continue;
-    // The unit meets others, but has a way.
     const AxisPaths straight = Straight(q_.drives[i], q_.from[i], q_.to[i]).path;
     if (motions_.KeepsLimits(i, straight)) Set(i, straight);
+  }
+  for (const auto& [end, i] : order) {
+    if (IsAbandoned(q_.abandoned)) break;
+    const AxisPaths straight = motions_.path(i);
+    TakeOut(i);
+    if (!Replan(i)) Set(i, straight);
   }
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
     if (!MayPlan(i)) continue;
@@ -302,7 +301,7 @@ void DenseSearch::ChooseMet(std::size_t first, std::size_t last) {
     const std::uint32_t i = chosen_[n].unit;
     for (std::uint32_t slot = 0; slot < scene_.neighbours(i).size(); ++slot) {
       if (chosen_.size() >= kChosenMost) return;
-      if (motions_.Meets(i, motions_.track(i), slot)) Choose(scene_.neighbours(i)[slot].unit);
+      if (motions_.Meet(i, slot)) Choose(scene_.neighbours(i)[slot].unit);
     }
   }
 }
@@ -314,14 +313,13 @@ void DenseSearch::PutBack(std::span<const Before> before) {
 }
 
 /// The sum of the weights of the conflicts that chosen units have now.
-int DenseSearch::ConflictsOfChosen() const {
+int DenseSearch::ConflictsOfChosen() {
   int weight = 0;
   for (const Before& b : chosen_) {
     for (std::uint32_t slot = 0; slot < scene_.neighbours(b.unit).size(); ++slot) {
       const std::uint32_t other = scene_.neighbours(b.unit)[slot].unit;
       if (IsChosen(other) && other < b.unit) continue;
-      if (motions_.Meets(b.unit, motions_.track(b.unit), slot))
-        weight += WeightOf(std::minmax(b.unit, other));
+      if (motions_.Meet(b.unit, slot)) weight += WeightOf(std::minmax(b.unit, other));
     }
   }
   return weight;
@@ -445,7 +443,7 @@ void DenseSearch::Improve() {
   const double begun_s = Work_s();
   int failures = 0;
   double share = kCutShare;
-  const auto least_step = static_cast<std::int32_t>(std::ceil(q_.within_s / h)) + 1;
+  const auto least_step = static_cast<std::int32_t>(std::ceil(q_.within_s / h - 1e-6));
   while (Work_s() - begun_s < options_.improve_cpu_s && !IsAbandoned(q_.abandoned)) {
     const double end_s = End();
     if (end_s <= kGoodEnough * q_.within_s) break;

@@ -203,7 +203,7 @@ std::optional<JointSearch::Found> JointSearch::LayOut() const {
       const Member& member = q_.members[m];
       if (member.around == nullptr) continue;
       std::array<std::uint64_t, kStepWordsMost> bits{};
-      RasterBitsAt(*member.arm, way_[c][m], *member.around, words, bits.data());
+      RasterBitsAt(member.arm->At(way_[c][m]), *member.around, {words, words}, bits.data());
       for (std::size_t s = 0; s < row; ++s)
         if ((bits[s / 64] >> (s % 64) & 1) != 0) ++meets[c * row + s];
     }

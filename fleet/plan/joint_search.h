@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "fleet/plan/occupancy.h"
-#include "fleet/plan/soft_search.h"
+#include "fleet/plan/pose_grid.h"
 #include "protocol/base/rng.h"
 
 namespace focalfleet {

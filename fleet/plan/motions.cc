@@ -15,23 +15,28 @@ Motions::Motions(const LocalSearchRequest& request)
       tracks_(scene_.size()),
       unnoticed_(scene_.size()),
       weight_(scene_.size()),
-      order_(scene_.size()) {
+      order_(scene_.size()),
+      count_(scene_.size(), 0),
+      answers_(scene_.size()) {
   without_notice_.notice_s = 0;
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
     const std::size_t near = scene_.neighbours(i).size();
     weight_[i].assign(near, 1);
     unnoticed_[i].assign(near, 0);
+    answers_[i].assign(near, {});
     order_[i].resize(near);
     std::iota(order_[i].begin(), order_[i].end(), 0u);
   }
 }
 
 void Motions::Begin(std::uint32_t unit, const AxisPaths& path) {
+  ++count_[unit];
   paths_[unit] = path;
   tracks_[unit] = TrackOf(unit, path);
 }
 
 void Motions::BeginStanding(std::uint32_t unit) {
+  ++count_[unit];
   tracks_[unit] = Track(scene_.arm(unit), q_.from[unit]);
 }
 
@@ -41,6 +46,7 @@ void Motions::Replace(std::uint32_t unit, const AxisPaths& paths, Track track) {
     FOCALFLEET_CHECK(q_.ledger->Enter(unit, paths));
   }
   if (in_trial_) before_.push_back({unit, std::move(paths_[unit]), std::move(tracks_[unit])});
+  ++count_[unit];
   paths_[unit] = paths;
   tracks_[unit] = std::move(track);
 }
@@ -64,6 +70,26 @@ bool Motions::Meets(std::uint32_t unit, const Track& track, std::uint32_t slot) 
                                          near.need_mm, tolerance)
                           : !PassesClear(scene_.arm(near.unit), other, scene_.arm(unit), track,
                                          near.need_mm, tolerance);
+}
+
+bool Motions::Meet(std::uint32_t unit, std::uint32_t slot) {
+  const std::uint32_t other = scene_.neighbours(unit)[slot].unit;
+  Answer& answer = answers_[unit][slot];
+  if (answer.known && answer.own_count == count_[unit] && answer.other_count == count_[other])
+    return answer.meet;
+  answer = {count_[unit], count_[other], true, Meets(unit, tracks_[unit], slot)};
+  answers_[other][SlotOf(other, unit)] = {count_[other], count_[unit], true, answer.meet};
+  return answer.meet;
+}
+
+bool Motions::MeetsForGood(std::uint32_t unit) {
+  const Track& own = tracks_[unit];
+  for (const StandingThing& thing : scene_.standing(unit))
+    if (own.moves() && !PassesClearOf(scene_.arm(unit), own, thing.capsule, thing.need_mm))
+      return true;
+  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot)
+    if (q_.movable[scene_.neighbours(unit)[slot].unit] == 0 && Meet(unit, slot)) return true;
+  return false;
 }
 
 double Motions::Cost(std::uint32_t unit, const Track& track, double limit) {
@@ -92,8 +118,10 @@ void Motions::AddWeight(std::uint32_t unit, std::uint32_t slot) {
 
 void Motions::GiveUpNotice(std::uint32_t unit, std::uint32_t slot) {
   unnoticed_[unit][slot] = 1;
+  answers_[unit][slot].known = false;
   const std::uint32_t other = scene_.neighbours(unit)[slot].unit;
   unnoticed_[other][SlotOf(other, unit)] = 1;
+  answers_[other][SlotOf(other, unit)].known = false;
 }
 
 void Motions::BeginTrial() {
@@ -108,10 +136,12 @@ bool Motions::EndTrial() {
                                   [&](const Before& made) { return InConflict(made.unit); });
   if (clear) return true;
   for (auto it = before_.rbegin(); it != before_.rend(); ++it) {
+    ++count_[it->unit];
     paths_[it->unit] = std::move(it->path);
     tracks_[it->unit] = std::move(it->track);
   }
   unnoticed_ = unnoticed_before_;
+  for (std::vector<Answer>& answers : answers_) answers.assign(answers.size(), {});
   return false;
 }
 

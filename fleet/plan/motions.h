@@ -55,6 +55,11 @@ class Motions {
   [[nodiscard]] std::uint32_t SlotOf(std::uint32_t unit, std::uint32_t other) const;
   /// With `track`, the unit is in conflict with its neighbour in this slot.
   [[nodiscard]] bool Meets(std::uint32_t unit, const Track& track, std::uint32_t slot) const;
+  /// The present motions of the unit and of its neighbour in this slot are in conflict. The answer
+  /// is kept until either has another motion.
+  [[nodiscard]] bool Meet(std::uint32_t unit, std::uint32_t slot);
+  /// The present motion of the unit meets something that never moves.
+  [[nodiscard]] bool MeetsForGood(std::uint32_t unit);
   /// Sum of the weights of the neighbours that `track` meets; at least `limit` once that is
   /// reached. kNever: it meets something that never moves.
   double Cost(std::uint32_t unit, const Track& track, double limit);
@@ -97,6 +102,14 @@ class Motions {
   std::vector<std::vector<std::uint8_t>> unnoticed_;  // by unit and slot: the pair has no notice
   std::vector<std::vector<float>> weight_;            // by unit and neighbour's slot
   std::vector<std::vector<std::uint32_t>> order_;     // slots, those that mattered last first
+  struct Answer {
+    std::uint32_t own_count = 0;  // of the motions that both had had when it was found
+    std::uint32_t other_count = 0;
+    bool known = false;
+    bool meet = false;
+  };
+  std::vector<std::uint32_t> count_;          // by unit: motions that it has had
+  std::vector<std::vector<Answer>> answers_;  // by unit and slot
   bool in_trial_ = false;
   std::vector<Before> before_;  // in the order in which units were replaced in the trial
   std::vector<std::vector<std::uint8_t>> unnoticed_before_;

@@ -7,23 +7,24 @@
 namespace focalfleet {
 namespace {
 
-/// A cell is too near where its middle is: a core may pass it at half a cell's width.
-constexpr double kMarginMm = 0.3;
+/// A cell is too near where its middle is: a core may pass it at half a cell's width. Of a cell.
+constexpr double kMargin = 0.5;
+constexpr double kCellsPerNeed = 4;
 
-std::int32_t CellOf(double mm) {
-  return static_cast<std::int32_t>(std::floor(mm / Occupancy::kCellMm));
+std::int32_t CellOf(double mm, double cell_mm) {
+  return static_cast<std::int32_t>(std::floor(mm / cell_mm));
 }
 
-RasterWindow WindowAround(const PointFp& centre, double radius_mm) {
-  RasterWindow window;
-  window.x0 = CellOf(centre.x_mm - radius_mm);
-  window.y0 = CellOf(centre.y_mm - radius_mm);
-  window.width = CellOf(centre.x_mm + radius_mm) - window.x0 + 1;
-  window.height = CellOf(centre.y_mm + radius_mm) - window.y0 + 1;
+RasterWindow WindowAround(const PointFp& centre, double radius_mm, double cell_mm) {
+  RasterWindow window{.cell_mm = cell_mm};
+  window.x0 = CellOf(centre.x_mm - radius_mm, cell_mm);
+  window.y0 = CellOf(centre.y_mm - radius_mm, cell_mm);
+  window.width = CellOf(centre.x_mm + radius_mm, cell_mm) - window.x0 + 1;
+  window.height = CellOf(centre.y_mm + radius_mm, cell_mm) - window.y0 + 1;
   return window;
 }
 
-double MiddleOf(std::int32_t cell) { return (cell + 0.5) * Occupancy::kCellMm; }
+double MiddleOf(std::int32_t cell, double cell_mm) { return (cell + 0.5) * cell_mm; }
 
 /// The cells of a row whose middles are nearer than the radius to the line: a stadium is convex.
 struct RowSpan {
@@ -93,14 +94,18 @@ Occupancy::Occupancy(const Motions& motions, const TimeSteps& steps)
       drawn_(scene_.size(), 0),
       bits_(scene_.size()),
       standing_(scene_.size()) {
+  double most_mm = 0;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    for (const NeighbourNeed& near : scene_.neighbours(i))
+      radius_mm_[i] = std::max(radius_mm_[i], near.need_mm);
+    most_mm = std::max(most_mm, radius_mm_[i]);
+  }
+  if (most_mm > 0) cell_mm_ = most_mm / kCellsPerNeed;
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
     const ArmGeometry& arm = scene_.arm(i);
-    double need_mm = 0;
-    for (const NeighbourNeed& near : scene_.neighbours(i))
-      need_mm = std::max(need_mm, near.need_mm);
-    radius_mm_[i] = need_mm + kMarginMm;
+    radius_mm_[i] += kMargin * cell_mm_;
     const double reach = arm.theta_arm_mm() + arm.phi_arm_mm();
-    windows_[i] = WindowAround(arm.base_fp(), reach + radius_mm_[i]);
+    windows_[i] = WindowAround(arm.base_fp(), reach + radius_mm_[i], cell_mm_);
     if (!scene_.standing(i).empty()) FindStanding(i);
   }
 }
@@ -108,12 +113,13 @@ Occupancy::Occupancy(const Motions& motions, const TimeSteps& steps)
 /// Cells of the unit's own disc that something takes for ever.
 void Occupancy::FindStanding(std::uint32_t unit) {
   const ArmGeometry& arm = scene_.arm(unit);
-  const RasterWindow own = WindowAround(arm.base_fp(), arm.theta_arm_mm() + arm.phi_arm_mm());
+  const RasterWindow own =
+      WindowAround(arm.base_fp(), arm.theta_arm_mm() + arm.phi_arm_mm(), cell_mm_);
   for (std::int32_t y = 0; y < own.height; ++y) {
     for (std::int32_t x = 0; x < own.width; ++x) {
-      const PointFp middle{MiddleOf(own.x0 + x), MiddleOf(own.y0 + y)};
+      const PointFp middle{MiddleOf(own.x0 + x, cell_mm_), MiddleOf(own.y0 + y, cell_mm_)};
       const auto takes = [&](const StandingThing& thing) {
-        const double near = thing.need_mm + thing.capsule.radius_mm + kMarginMm;
+        const double near = thing.need_mm + thing.capsule.radius_mm + kMargin * cell_mm_;
         return SquaredDistance(middle, thing.capsule.line) < near * near;
       };
       if (std::any_of(scene_.standing(unit).begin(), scene_.standing(unit).end(), takes))
@@ -131,16 +137,16 @@ void Occupancy::DrawArm(std::uint32_t unit, const SegmentFp& line, std::int32_t 
   const double radius = radius_mm_[unit];
   std::uint64_t* const bits = bits_[unit].data();
   const std::size_t words = steps_.words();
-  const auto low_y = CellOf(std::min(line.a.y_mm, line.b.y_mm) - radius);
-  const auto high_y = CellOf(std::max(line.a.y_mm, line.b.y_mm) + radius);
+  const auto low_y = CellOf(std::min(line.a.y_mm, line.b.y_mm) - radius, cell_mm_);
+  const auto high_y = CellOf(std::max(line.a.y_mm, line.b.y_mm) + radius, cell_mm_);
   for (std::int32_t y = std::max(low_y, window.y0);
        y <= std::min(high_y, window.y0 + window.height - 1); ++y) {
-    const RowSpan span = SpanAt(line, radius, MiddleOf(y));
+    const RowSpan span = SpanAt(line, radius, MiddleOf(y, cell_mm_));
     if (span.low > span.high) continue;
     const auto from =
-        std::max(static_cast<std::int32_t>(std::ceil(span.low / kCellMm - 0.5)) - window.x0, 0);
+        std::max(static_cast<std::int32_t>(std::ceil(span.low / cell_mm_ - 0.5)) - window.x0, 0);
     const auto to =
-        std::min(static_cast<std::int32_t>(std::floor(span.high / kCellMm - 0.5)) - window.x0,
+        std::min(static_cast<std::int32_t>(std::floor(span.high / cell_mm_ - 0.5)) - window.x0,
                  window.width - 1);
     std::uint64_t* cell =
         bits + (static_cast<std::size_t>(y - window.y0) * static_cast<std::size_t>(window.width) +
@@ -176,7 +182,7 @@ void Occupancy::Draw(std::uint32_t unit) {
               step(leg.end_s + tolerance.Slip(leg.end_s)));
       continue;
     }
-    const int parts = std::max(1, static_cast<int>(std::ceil((leg.end_s - leg.begin_s) / (h / 2))));
+    const int parts = std::max(1, static_cast<int>(std::ceil((leg.end_s - leg.begin_s) / h)));
     const double lasts = (leg.end_s - leg.begin_s) / parts;
     for (int n = 0; n < parts; ++n) {
       const double begin = leg.begin_s + n * lasts;
@@ -190,7 +196,7 @@ void Occupancy::Draw(std::uint32_t unit) {
 void Occupancy::Look(std::uint32_t unit, Surround* out) {
   const ArmGeometry& arm = scene_.arm(unit);
   const std::size_t words = steps_.words();
-  out->window = WindowAround(arm.base_fp(), arm.theta_arm_mm() + arm.phi_arm_mm());
+  out->window = WindowAround(arm.base_fp(), arm.theta_arm_mm() + arm.phi_arm_mm(), cell_mm_);
   const RasterWindow& own = out->window;
   out->bits.assign(own.cells() * words, 0);
   for (const NeighbourNeed& near : scene_.neighbours(unit)) {

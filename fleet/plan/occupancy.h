@@ -3,10 +3,10 @@
 // fibre or elbow, or any point between them, would come too near to the arm whose raster it is, for
 // some start skew and clock.
 //
-// The raster decides nothing: a cell is as wide as a fraction of an arm, and a motion that it calls
-// clear is proven by its track (track.h). The raster answers within nanoseconds whether a pose
-// meets anything at each step, where the exact test of all neighbours takes a thousand times as
-// long.
+// The raster decides nothing: a cell is a quarter as wide as the distance that arms keep, and a
+// motion that it calls clear is proven by its track (track.h). The raster answers within
+// nanoseconds whether a pose meets anything at each step, where the exact test of all neighbours
+// takes a thousand times as long.
 #pragma once
 
 #include <cstdint>
@@ -37,6 +37,7 @@ TimeSteps StepsUntil(const Scene& scene, std::span<const UnitDrive> drives, doub
 
 /// A part of the raster of the plate. Cells are counted from the plate's origin.
 struct RasterWindow {
+  double cell_mm = 1;
   std::int32_t x0 = 0;
   std::int32_t y0 = 0;
   std::int32_t width = 0;
@@ -54,8 +55,6 @@ struct Surround {
 
 class Occupancy {
  public:
-  static constexpr double kCellMm = 1;
-
   /// Lifetime: `motions` outlives this.
   Occupancy(const Motions& motions, const TimeSteps& steps);
 
@@ -74,6 +73,7 @@ class Occupancy {
   const Motions& motions_;
   const Scene& scene_;
   TimeSteps steps_;
+  double cell_mm_ = 1;
   std::vector<double> radius_mm_;  // by unit: nearer than this to its core is too near
   std::vector<RasterWindow> windows_;
   std::vector<std::uint8_t> drawn_;

@@ -65,6 +65,13 @@ PoseBox BoxOf(const ArmGeometry& arm, const UnitKnowledge& knowledge) {
 }
 
 std::vector<Capsule> CoverOf(const ArmGeometry& arm, const PoseBox& box, double slack_mm) {
+  // Theta may be anywhere: the arm takes a disc, exactly. An arm of another that stands within its
+  // hole, if it has one, would cross the ring around it.
+  const double turns = (static_cast<double>(box.high[0]) - box.low[0]) * arm.step_rad(Axis::kTheta);
+  if (turns >= 2 * std::numbers::pi) {
+    const double fibre_mm = arm.FibreRadiusMax(box.low[1], box.high[1]);
+    return {{{arm.base_fp(), arm.base_fp()}, std::max(arm.theta_arm_mm(), fibre_mm)}};
+  }
   const double theta_half = (static_cast<double>(box.high[0]) - box.low[0]) / 2;
   const double phi_half = (static_cast<double>(box.high[1]) - box.low[1]) / 2;
   std::array<std::int32_t, kAxisCount> parts{1, 1};

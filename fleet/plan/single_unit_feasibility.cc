@@ -23,6 +23,7 @@ std::optional<NoWay> NoWayFor(const Service& service, std::uint32_t unit) {
     if (thing.by != kNoUnitIndex) continue;
     never_move.push_back({thing.capsule, thing.least_mm, thing.by});
   }
+  if (never_move.empty()) return std::nullopt;
   return ProveNoWay({.arm = &scene.arm(unit),
                      .never_move = never_move,
                      .from = service.start(unit),
