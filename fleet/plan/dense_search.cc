@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <utility>
@@ -11,13 +12,13 @@
 #include "fleet/plan/joint_search.h"
 #include "fleet/plan/motions.h"
 #include "fleet/plan/occupancy.h"
+#include "fleet/plan/pair_search.h"
 #include "fleet/plan/soft_search.h"
 #include "protocol/base/rng.h"
 
 namespace focalfleet {
 namespace {
 
-constexpr double kStepDeg = 6;          // that the quickest unit turns in one step
 constexpr std::size_t kChosenMost = 8;  // units that are planned anew together
 constexpr int kUnitsPerRepair = 2;      // of the first plan, until more time is allowed
 constexpr int kRepairsAtLeast = 100;
@@ -25,7 +26,9 @@ constexpr std::int32_t kExtendBy = 6;  // the time grows by this part of it
 constexpr int kTriesWithMostTime = 3;
 /// More conflicts than one for so many units, which hardly get fewer: no end is in sight.
 constexpr std::size_t kHopelessShare = 10;
-constexpr double kWithinMost = 2;  // times the time of the first plan; it may never take longer
+constexpr std::size_t kHopelessAtLeast = 4;
+constexpr double kTurnsMost = 1.6;  // whole turns of the slowest axis
+constexpr double kWithinMost = 2;   // times the time of the first plan; it may never take longer
 constexpr int kRepairsPerCut = 120;
 /// A cut is at least this share of the time that is above the bound; each failure halves it.
 constexpr double kCutShare = 0.4;
@@ -34,13 +37,20 @@ constexpr double kGoodEnough = 1.005;   // times the bound: nothing is left to g
 constexpr int kRepairsWithNotice = 12;  // then a pair need not be clear with notice
 /// A pair that fails so often weighs one conflict more (breakout local search, Morris 1993).
 constexpr int kFailuresPerWeight = 6;
+constexpr int kFailuresUntilThorough = 3;
 /// Cost of work, in seconds of CPU.
 constexpr double kWordCost_s = 2e-9;
-constexpr double kReplanCost_s = 150e-6;
+constexpr double kReplanCost_s = 500e-6;
 constexpr double kJointStepCost_s = 0.8e-6;
 
 TimeSteps DenseStepsOf(const LocalSearchRequest& q) {
   double end_s = kWithinMost * q.within_s;
+  // Two that are hooked into each other may need turns that neither needs alone.
+  for (std::uint32_t i = 0; i < q.scene->size(); ++i)
+    if (q.movable[i] != 0)
+      for (const Axis axis : kAxes)
+        end_s = std::max(end_s, kTurnsMost * 2 * std::numbers::pi / q.scene->arm(i).step_rad(axis) *
+                                    SecondsPerVector(q.drives[i].axis[Index(axis)]));
   for (std::uint32_t i = 0; i < q.scene->size() && !q.begin_with.empty(); ++i)
     if (!IsEmpty(q.begin_with[i]) && q.scene->is_place(i))
       end_s =
@@ -76,7 +86,12 @@ class DenseSearch {
     return q_.movable[unit] != 0 && !motions_.IsGiven(unit) && scene_.is_place(unit);
   }
   bool Replan(std::uint32_t unit);
-  bool ReplanTogether(std::span<const std::uint32_t> units);
+  StepQuestion Ask(std::uint32_t unit, std::size_t m);
+  bool ReplanTogether(std::span<const std::uint32_t> units, bool thoroughly);
+  bool Take(std::span<const std::uint32_t> units, std::span<const AxisPaths> paths);
+  [[nodiscard]] double NeedOf(std::uint32_t a, std::uint32_t b) const {
+    return scene_.neighbours(a)[motions_.SlotOf(a, b)].need_mm;
+  }
   void FindRests(std::span<const std::uint32_t> units);
   void Set(std::uint32_t unit, const AxisPaths& path) {
     motions_.Replace(unit, path);
@@ -107,7 +122,7 @@ class DenseSearch {
   }
   [[nodiscard]] double End() const;
   [[nodiscard]] double Work_s() const {
-    return static_cast<double>(search_.work()) * kWordCost_s +
+    return static_cast<double>(search_.work() + pair_search_.work()) * kWordCost_s +
            static_cast<double>(replans_) * kReplanCost_s +
            static_cast<double>(joint_.work()) * kJointStepCost_s;
   }
@@ -120,6 +135,7 @@ class DenseSearch {
   Occupancy occupancy_;
   SoftSearch search_;
   JointSearch joint_;
+  PairSearch pair_search_;
   std::int32_t end_step_ = 0;
   std::set<Pair> conflicts_;
   std::map<Pair, int> failures_;    // repairs of a pair that did not stay
@@ -129,7 +145,7 @@ class DenseSearch {
   std::uint64_t replans_ = 0;
   // Scratch.
   std::array<Surround, JointSearch::kMembersMax> around_;
-  std::vector<MovingNeighbour> moving_;
+  std::array<std::vector<MovingNeighbour>, JointSearch::kMembersMax> moving_;
   std::vector<std::uint8_t> rests_;
 };
 
@@ -169,37 +185,49 @@ void DenseSearch::FindRests(std::span<const std::uint32_t> units) {
   }
 }
 
-/// Pre: the unit is taken out.
-bool DenseSearch::Replan(std::uint32_t unit) {
-  ++replans_;
-  occupancy_.Look(unit, &around_[0]);
-  moving_.clear();
+/// What the searches of the m-th of some units that are planned anew are asked. Lifetime: until the
+/// m-th is asked again, and the rests of the units are found again.
+StepQuestion DenseSearch::Ask(std::uint32_t unit, std::size_t m) {
+  occupancy_.Look(unit, &around_[m]);
+  moving_[m].clear();
   for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot) {
     const NeighbourNeed& near = scene_.neighbours(unit)[slot];
     if (scene_.is_place(near.unit) && !motions_.track(near.unit).legs().empty())
-      moving_.push_back({&scene_.arm(near.unit), &motions_.track(near.unit), near.need_mm,
-                         motions_.ToleranceOf(unit, slot)});
+      moving_[m].push_back({&scene_.arm(near.unit), &motions_.track(near.unit), near.need_mm,
+                            motions_.ToleranceOf(unit, slot)});
   }
+  return {.arm = &scene_.arm(unit),
+          .drive = &q_.drives[unit],
+          .around = &around_[m],
+          .moving = moving_[m],
+          .standing = scene_.standing(unit),
+          .steps = occupancy_.steps(),
+          .from = q_.from[unit],
+          .to = q_.to[unit],
+          .within = RangeAround(scene_.arm(unit), q_.from[unit]),
+          .end_step = end_step_,
+          .rests = rests_};
+}
+
+/// Pre: the unit is taken out.
+bool DenseSearch::Replan(std::uint32_t unit) {
+  ++replans_;
   FindRests({&unit, 1});
-  const StepQuestion question{.arm = &scene_.arm(unit),
-                              .drive = &q_.drives[unit],
-                              .around = &around_[0],
-                              .moving = moving_,
-                              .standing = scene_.standing(unit),
-                              .steps = occupancy_.steps(),
-                              .from = q_.from[unit],
-                              .to = q_.to[unit],
-                              .within = RangeAround(scene_.arm(unit), q_.from[unit]),
-                              .end_step = end_step_,
-                              .rests = rests_};
-  const auto found = search_.Find(question, false);
+  const auto found = search_.Find(Ask(unit, 0), false);
   if (!found || !motions_.KeepsLimits(unit, found->paths)) return false;
   Set(unit, found->paths);
   return !motions_.MeetsForGood(unit);
 }
 
 /// Pre: the units are taken out; all are neighbours of each other.
-bool DenseSearch::ReplanTogether(std::span<const std::uint32_t> units) {
+bool DenseSearch::ReplanTogether(std::span<const std::uint32_t> units, bool thoroughly) {
+  FindRests(units);
+  if (thoroughly && units.size() == 2) {
+    const auto found = pair_search_.Find(
+        {.units = {Ask(units[0], 0), Ask(units[1], 1)}, .need_mm = NeedOf(units[0], units[1])});
+    if (found && Take(units, found->paths)) return true;
+    for (const std::uint32_t i : units) TakeOut(i);
+  }
   JointSearch::Question question;
   question.steps = occupancy_.steps();
   question.end_step = end_step_;
@@ -215,17 +243,19 @@ bool DenseSearch::ReplanTogether(std::span<const std::uint32_t> units) {
                   .to = q_.to[i],
                   .within = RangeAround(scene_.arm(i), q_.from[i])};
     for (std::size_t other = 0; other < m; ++other)
-      question.need_mm[other][m] =
-          scene_.neighbours(units[other])[motions_.SlotOf(units[other], i)].need_mm;
+      question.need_mm[other][m] = NeedOf(units[other], i);
   }
   question.members = std::span(members).first(units.size());
-  FindRests(units);
   question.rests = rests_;
   const auto found = joint_.Find(question, &rng_);
-  if (!found) return false;
+  return found && Take(units, found->paths);
+}
+
+/// The units take these ways. False: one breaks a limit of power, or meets what never moves.
+bool DenseSearch::Take(std::span<const std::uint32_t> units, std::span<const AxisPaths> paths) {
   for (std::size_t m = 0; m < units.size(); ++m) {
-    if (!motions_.KeepsLimits(units[m], found->paths[m])) return false;
-    Set(units[m], found->paths[m]);
+    if (!motions_.KeepsLimits(units[m], paths[m])) return false;
+    Set(units[m], paths[m]);
     if (motions_.MeetsForGood(units[m])) return false;
   }
   // The members keep to one clock: they are clear of each other, but perhaps not with notice.
@@ -355,7 +385,10 @@ bool DenseSearch::Repair(const Pair& pair) {
       planned += Choose(third) ? 1u : 0u;
     std::array<std::uint32_t, JointSearch::kMembersMax> units{};
     for (std::size_t n = 0; n < planned; ++n) units[n] = chosen_[n].unit;
-    ok = ReplanTogether(std::span(units).first(planned));
+    // Trees are quick and often find a way; where they have failed, all ways are looked at.
+    const auto failed = failures_.find(pair);
+    const bool thoroughly = failed != failures_.end() && failed->second >= kFailuresUntilThorough;
+    ok = ReplanTogether(std::span(units).first(planned), thoroughly);
   } else {
     if (planned == 2 && rng_.Below(2) == 0) std::swap(chosen_[0], chosen_[1]);
     ok = Replan(chosen_[0].unit);
@@ -406,7 +439,8 @@ bool DenseSearch::CompleteFirst() {
     if (RepairAll(repairs)) return true;
     if (IsAbandoned(q_.abandoned)) return false;
     // Units without any way keep many others in conflict.
-    if (conflicts_.size() > scene_.size() / kHopelessShare && 10 * conflicts_.size() > 9 * before)
+    if (conflicts_.size() > std::max(kHopelessAtLeast, scene_.size() / kHopelessShare) &&
+        10 * conflicts_.size() > 9 * before)
       return false;
     end_step_ = std::min(most, end_step_ + std::max(1, end_step_ / kExtendBy));
   }

@@ -15,7 +15,9 @@ namespace focalfleet {
 namespace {
 
 constexpr double kImpossible = Motions::kNever;
-constexpr int kAttemptsPerUnit = 16;  // attempts of one unit; afterwards it keeps its last way
+/// Attempts of one unit. Afterwards it keeps its last way, and a search by neighbourhoods goes on
+/// (dense_search.h).
+constexpr int kAttemptsPerUnit = 8;
 /// From this attempt on, each attempt allows the unit 3 % more time.
 constexpr int kAttemptsInTime = 5;
 constexpr double kExtension = 0.03;

@@ -2,14 +2,30 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
 
 namespace focalfleet {
+namespace {
+
+constexpr double kSweepGuardMm = 1e-6;  // covers rounding
+
+}  // namespace
 
 bool SweepClear(const ArmGeometry& arm, const Sweep& sweep, std::span<const Blocker> blockers,
                 std::uint32_t* by, int budget) {
+  // Most blockers are too far away for any pose of the sweep; one distance says so.
+  const auto middle = [&](std::size_t k) {
+    return (static_cast<double>(sweep.from[k]) + sweep.to[k]) / 2;
+  };
+  const SegmentFp line = arm.AtAngles(arm.Theta(0) + middle(0) * arm.step_rad(Axis::kTheta),
+                                      arm.Fold(0) + middle(1) * arm.step_rad(Axis::kPhi));
+  const double travel_mm = arm.TravelBound(std::abs(sweep.to[0] - sweep.from[0]) / 2.0,
+                                           std::abs(sweep.to[1] - sweep.from[1]) / 2.0);
   for (const Blocker& blocker : blockers) {
+    const double far_mm = blocker.need_mm + blocker.capsule.radius_mm + travel_mm + kSweepGuardMm;
+    if (SquaredDistance(line, blocker.capsule.line) > far_mm * far_mm) continue;
     if (SweepClearOf(arm, sweep, blocker.capsule, blocker.need_mm, budget)) continue;
     if (by != nullptr) *by = blocker.by;
     return false;

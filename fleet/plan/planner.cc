@@ -241,21 +241,22 @@ double Planner::MeanNeighbours() const {
   return scene_.size() == 0 ? 0 : static_cast<double>(sum) / static_cast<double>(scene_.size());
 }
 
-/// Dense plates are searched by neighbourhoods, and so are others where the plan ends late.
+/// Dense plates are searched by neighbourhoods, and so are others where units find no way around
+/// each other or the plan ends late.
 LocalSearchResult Planner::Search(LocalSearchRequest search) const {
   const DenseSearchOptions dense{.within = kDenseWithin, .improve_cpu_s = options_.improve_cpu_s};
   if (dense_) return SearchDense(search, dense);
   LocalSearchResult made = SearchLocally(search);
-  if (made.starved || !made.in_conflict.empty() || search.ledger != nullptr ||
-      !search.given.empty() || dense.improve_cpu_s <= 0)
-    return made;
+  if (made.starved || search.ledger != nullptr || !search.given.empty()) return made;
   double end_s = 0;
   for (const Track& track : made.tracks)
     if (!track.legs().empty()) end_s = std::max(end_s, track.end_s());
-  if (end_s <= kWorthImproving * search.within_s) return made;
+  if (made.in_conflict.empty() &&
+      (end_s <= kWorthImproving * search.within_s || dense.improve_cpu_s <= 0))
+    return made;
   search.begin_with = made.paths;
-  LocalSearchResult sooner = SearchDense(search, dense);
-  return sooner.in_conflict.empty() ? sooner : made;
+  LocalSearchResult other = SearchDense(search, dense);
+  return other.in_conflict.size() <= made.in_conflict.size() ? other : made;
 }
 
 /// Plans all units at once. False: some units still meet others, and nothing is planned.
