@@ -8,9 +8,10 @@ namespace {
 
 /// Between two poses of a step the arms may be nearer than at both; away from start and target they
 /// keep this share of their distance more.
-constexpr double kMarginShare = 0.06;
+constexpr std::array kMarginShares{0.06, 0.0};
 constexpr std::int32_t kPairTightSteps = 1;  // so near to both starts, or both targets, no margin
-constexpr int kTestsMost = 20'000;           // of steps, while a way is read
+constexpr std::uint64_t kWordsPerColumn = 200;  // that cost as much as one column of distances
+constexpr int kTestsMost = 20'000;              // of steps, while a way is read
 
 bool IsTight(const GridPose& a, const GridPose& b) {
   return PoseGrid::StepsBetween(a, b) <= kPairTightSteps;
@@ -54,6 +55,20 @@ bool PairSearch::FindLiving(std::size_t m, std::int32_t end_step) {
   return grid.Has(set(0), grid.from());
 }
 
+bool PairSearch::IsSamePair(const Question& question) const {
+  if (question.need_mm != q_.need_mm) return false;
+  for (std::size_t m = 0; m < 2; ++m) {
+    const StepQuestion& a = question.units[m];
+    const StepQuestion& b = q_.units[m];
+    if (a.arm != b.arm || a.drive != b.drive || a.from != b.from || a.to != b.to ||
+        a.within != b.within || a.steps.ticks != b.steps.ticks)
+      return false;
+  }
+  return true;
+}
+
+double PairSearch::margin_mm() const { return kMarginShares[margin_] * q_.need_mm; }
+
 void PairSearch::SetUpLines() {
   for (std::size_t m = 0; m < 2; ++m) {
     lines_[m].clear();
@@ -61,12 +76,16 @@ void PairSearch::SetUpLines() {
       for (std::int32_t b = 0; b < grid_[m].count(1); ++b)
         lines_[m].push_back(q_.units[m].arm->At(grid_[m].At({a, b})));
   }
+  for (Apart& apart : apart_) {
+    apart.row_of.assign(lines_[0].size(), -1);
+    apart.rows.clear();
+  }
 }
 
 bool PairSearch::IsApart(const GridPose& first, const GridPose& second) const {
   const bool tight = (IsTight(first, grid_[0].from()) && IsTight(second, grid_[1].from())) ||
                      (IsTight(first, grid_[0].to()) && IsTight(second, grid_[1].to()));
-  const double need_mm = q_.need_mm + (tight ? 0 : margin_mm_);
+  const double need_mm = q_.need_mm + (tight ? 0 : margin_mm());
   const SegmentFp& a = lines_[0][static_cast<std::size_t>(IndexOf(first))];
   const SegmentFp& b =
       lines_[1][static_cast<std::size_t>(second[0] * grid_[1].count(1) + second[1])];
@@ -75,17 +94,17 @@ bool PairSearch::IsApart(const GridPose& first, const GridPose& second) const {
 
 /// All poses of one theta of the second unit. Spans of phi too far away need one distance.
 void PairSearch::TakeColumn(const GridPose& first, std::int32_t theta, std::uint64_t* row) const {
-  struct Span {
+  struct PhiRun {
     std::int32_t low;
     std::int32_t high;
   };
   const PoseGrid& grid = grid_[1];
   const SegmentFp& line = lines_[0][static_cast<std::size_t>(IndexOf(first))];
-  std::array<Span, 64> stack;
+  std::array<PhiRun, 64> stack;
   std::size_t size = 0;
   stack[size++] = {0, grid.count(1) - 1};
   while (size > 0) {
-    const Span span = stack[--size];
+    const PhiRun span = stack[--size];
     const std::int32_t middle = (span.low + span.high) / 2;
     const std::int32_t half = std::max(middle - span.low, span.high - middle);
     if (half == 0) {
@@ -98,7 +117,7 @@ void PairSearch::TakeColumn(const GridPose& first, std::int32_t theta, std::uint
         std::max(grid.At({theta, span.high})[1] - grid.At({theta, middle})[1],
                  grid.At({theta, middle})[1] - grid.At({theta, span.low})[1]);
     const double travel_mm = q_.units[1].arm->TravelBound(0, vectors);
-    const double enough_mm = q_.need_mm + margin_mm_ + travel_mm;
+    const double enough_mm = q_.need_mm + margin_mm() + travel_mm;
     const double distance2 = SquaredDistance(line, other);
     if (distance2 > enough_mm * enough_mm) {
       for (std::int32_t phi = span.low; phi <= span.high; ++phi)
@@ -115,22 +134,23 @@ void PairSearch::TakeColumn(const GridPose& first, std::int32_t theta, std::uint
 /// The poses of the second unit that are apart from this one of the first.
 const std::uint64_t* PairSearch::ApartFrom(const GridPose& first) {
   const std::size_t n = grid_[1].words();
-  std::int32_t& index = apart_row_of_[static_cast<std::size_t>(IndexOf(first))];
+  Apart& apart = apart_[margin_];
+  std::int32_t& index = apart.row_of[static_cast<std::size_t>(IndexOf(first))];
   if (index < 0) {
-    index = static_cast<std::int32_t>(apart_.size() / n);
-    apart_.resize(apart_.size() + n, 0);
-    std::uint64_t* row = apart_.data() + static_cast<std::size_t>(index) * n;
+    index = static_cast<std::int32_t>(apart.rows.size() / n);
+    apart.rows.resize(apart.rows.size() + n, 0);
+    std::uint64_t* row = apart.rows.data() + static_cast<std::size_t>(index) * n;
     const ArmGeometry& arm = *q_.units[1].arm;
     const SegmentFp& line = lines_[0][static_cast<std::size_t>(IndexOf(first))];
-    const double far_mm = arm.theta_arm_mm() + arm.phi_arm_mm() + q_.need_mm + margin_mm_;
+    const double far_mm = arm.theta_arm_mm() + arm.phi_arm_mm() + q_.need_mm + margin_mm();
     if (SquaredDistance(arm.base_fp(), line) > far_mm * far_mm)
-      std::copy_n(free_[1].all(), n, row);
+      std::fill_n(row, n, ~std::uint64_t{0});
     else
       for (std::int32_t theta = 0; theta < grid_[1].count(0); ++theta)
         TakeColumn(first, theta, row);
-    work_ += 20 * n;
+    work_ += kWordsPerColumn * n;
   }
-  return apart_.data() + static_cast<std::size_t>(index) * n;
+  return apart.rows.data() + static_cast<std::size_t>(index) * n;
 }
 
 /// `out`: the rows of all poses within a step of `at`, together.
@@ -310,8 +330,6 @@ bool PairSearch::Spread(std::int32_t end_step, std::vector<State>* way) {
       break;
   for (std::vector<std::uint64_t>* scratch : {&spread_, &first_goes_, &joined_})
     scratch->assign(grid_[1].words(), 0);
-  apart_row_of_.assign(lines_[0].size(), -1);
-  apart_.clear();
   layers_.clear();
   Layer first;
   first.row_of.assign(lines_[0].size(), -1);
@@ -328,6 +346,8 @@ bool PairSearch::Spread(std::int32_t end_step, std::vector<State>* way) {
 }
 
 std::optional<PairSearch::Found> PairSearch::Find(const Question& question) {
+  const bool same = !lines_[0].empty() && IsSamePair(question);
+  if (!same) lines_[0].clear();
   q_ = question;
   const std::int32_t end_step = q_.units[0].end_step;
   for (std::size_t m = 0; m < 2; ++m) {
@@ -337,10 +357,9 @@ std::optional<PairSearch::Found> PairSearch::Find(const Question& question) {
     free_[m].SetUp(unit, grid_[m]);
     if (!FindLiving(m, end_step)) return std::nullopt;
   }
-  SetUpLines();
+  if (!same || lines_[0].empty()) SetUpLines();
   // A margin may close narrow ways out of a hook.
-  for (const double margin_mm : {kMarginShare * q_.need_mm, 0.0}) {
-    margin_mm_ = margin_mm;
+  for (margin_ = 0; margin_ < kMarginShares.size(); ++margin_) {
     std::vector<State> way;
     if (Spread(end_step, &way)) return LayOut(way);
   }

@@ -57,6 +57,8 @@ class PairSearch {
     return at[0] * grid_[0].count(1) + at[1];
   }
   void SetUpLines();
+  [[nodiscard]] bool IsSamePair(const Question& question) const;
+  [[nodiscard]] double margin_mm() const;
   const std::uint64_t* ApartFrom(const GridPose& first);
   [[nodiscard]] bool IsApart(const GridPose& first, const GridPose& second) const;
   void TakeColumn(const GridPose& first, std::int32_t theta, std::uint64_t* row) const;
@@ -74,9 +76,13 @@ class PairSearch {
   std::array<FreePoses, 2> free_;
   std::array<std::vector<std::uint64_t>, 2> living_;  // Shape: each (steps + 1, words)
   std::array<std::vector<SegmentFp>, 2> lines_;       // by pose
-  double margin_mm_ = 0;
-  std::vector<std::int32_t> apart_row_of_;  // by pose of the first unit; -1: not known yet
-  std::vector<std::uint64_t> apart_;
+  /// Which poses are apart does not depend on others, nor on time: known until another pair comes.
+  struct Apart {
+    std::vector<std::int32_t> row_of;  // by pose of the first unit; -1: not known yet
+    std::vector<std::uint64_t> rows;
+  };
+  std::size_t margin_ = 0;  // which of the margins counts
+  std::array<Apart, 2> apart_;
   std::vector<Layer> layers_;
   std::uint64_t work_ = 0;
   // Scratch.
