@@ -4,16 +4,15 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include "fleet/plan/joint_search.h"
 #include "fleet/plan/motions.h"
-#include "fleet/plan/occupancy.h"
 #include "fleet/plan/pair_search.h"
 #include "fleet/plan/soft_search.h"
+#include "fleet/plan/step_questions.h"
 #include "protocol/base/rng.h"
 
 namespace focalfleet {
@@ -27,8 +26,6 @@ constexpr int kTriesWithMostTime = 3;
 /// More conflicts than one for so many units, which hardly get fewer: no end is in sight.
 constexpr std::size_t kHopelessShare = 10;
 constexpr std::size_t kHopelessAtLeast = 4;
-constexpr double kTurnsMost = 1.6;  // whole turns of the slowest axis
-constexpr double kWithinMost = 2;   // times the time of the first plan; it may never take longer
 constexpr int kRepairsPerCut = 120;
 /// A cut is at least this share of the time that is above the bound; each failure halves it.
 constexpr double kCutShare = 0.4;
@@ -40,23 +37,8 @@ constexpr int kFailuresPerWeight = 6;
 constexpr int kFailuresUntilThorough = 3;
 /// Cost of work, in seconds of CPU.
 constexpr double kWordCost_s = 2e-9;
-constexpr double kReplanCost_s = 500e-6;
+constexpr double kReplanCost_s = 350e-6;
 constexpr double kJointStepCost_s = 0.8e-6;
-
-TimeSteps DenseStepsOf(const LocalSearchRequest& q) {
-  double end_s = kWithinMost * q.within_s;
-  // Two that are hooked into each other may need turns that neither needs alone.
-  for (std::uint32_t i = 0; i < q.scene->size(); ++i)
-    if (q.movable[i] != 0)
-      for (const Axis axis : kAxes)
-        end_s = std::max(end_s, kTurnsMost * 2 * std::numbers::pi / q.scene->arm(i).step_rad(axis) *
-                                    SecondsPerVector(q.drives[i].axis[Index(axis)]));
-  for (std::uint32_t i = 0; i < q.scene->size() && !q.begin_with.empty(); ++i)
-    if (!IsEmpty(q.begin_with[i]) && q.scene->is_place(i))
-      end_s =
-          std::max(end_s, Track(q.scene->arm(i), q.drives[i], q.from[i], q.begin_with[i]).end_s());
-  return StepsUntil(*q.scene, q.drives, end_s);
-}
 
 class DenseSearch {
  public:
@@ -66,10 +48,10 @@ class DenseSearch {
         scene_(*request.scene),
         rng_(Rng::Stream(request.seed, "dense")),
         motions_(request),
-        occupancy_(motions_, DenseStepsOf(request)),
-        end_step_(std::min(occupancy_.steps().count - 1,
+        questions_(&motions_),
+        end_step_(std::min(questions_.steps().count - 1,
                            static_cast<std::int32_t>(std::ceil(options.within * request.within_s /
-                                                               occupancy_.steps().step_s())) +
+                                                               questions_.steps().step_s())) +
                                1)) {}
 
   LocalSearchResult Run();
@@ -86,20 +68,15 @@ class DenseSearch {
     return q_.movable[unit] != 0 && !motions_.IsGiven(unit) && scene_.is_place(unit);
   }
   bool Replan(std::uint32_t unit);
-  StepQuestion Ask(std::uint32_t unit, std::size_t m);
   bool ReplanTogether(std::span<const std::uint32_t> units, bool thoroughly);
   bool Take(std::span<const std::uint32_t> units, std::span<const AxisPaths> paths);
-  [[nodiscard]] double NeedOf(std::uint32_t a, std::uint32_t b) const {
-    return scene_.neighbours(a)[motions_.SlotOf(a, b)].need_mm;
-  }
-  void FindRests(std::span<const std::uint32_t> units);
   void Set(std::uint32_t unit, const AxisPaths& path) {
     motions_.Replace(unit, path);
-    occupancy_.Forget(unit);
+    questions_.Forget(unit);
   }
   void TakeOut(std::uint32_t unit) {
     motions_.TakeOut(unit);
-    occupancy_.Forget(unit);
+    questions_.Forget(unit);
   }
   bool Choose(std::uint32_t unit);
   [[nodiscard]] bool IsChosen(std::uint32_t unit) const;
@@ -132,7 +109,7 @@ class DenseSearch {
   const Scene& scene_;
   Rng rng_;
   Motions motions_;
-  Occupancy occupancy_;
+  StepQuestions questions_;
   SoftSearch search_;
   JointSearch joint_;
   PairSearch pair_search_;
@@ -143,10 +120,6 @@ class DenseSearch {
   std::vector<Before> before_cut_;  // of units that were planned anew since the time was cut
   bool in_cut_ = false;
   std::uint64_t replans_ = 0;
-  // Scratch.
-  std::array<Surround, JointSearch::kMembersMax> around_;
-  std::array<std::vector<MovingNeighbour>, JointSearch::kMembersMax> moving_;
-  std::vector<std::uint8_t> rests_;
 };
 
 double DenseSearch::End() const {
@@ -167,86 +140,45 @@ void DenseSearch::UpdateConflicts(std::uint32_t unit) {
   }
 }
 
-/// The steps in which power has no room for all these units.
-void DenseSearch::FindRests(std::span<const std::uint32_t> units) {
-  rests_.clear();
-  if (q_.ledger == nullptr) return;
-  double power_W = 0;
-  for (const std::uint32_t i : units)
-    for (std::size_t k = 0; k < kAxisCount; ++k) power_W += q_.ledger->Motor_W(i, k);
-  const double h = occupancy_.steps().step_s();
-  rests_.resize(static_cast<std::size_t>(end_step_) + 1);
-  for (std::size_t step = 0; step < rests_.size(); ++step) {
-    const double from_s = static_cast<double>(step) * h;
-    const bool room = std::all_of(units.begin(), units.end(), [&](std::uint32_t i) {
-      return q_.ledger->HasRoom(i, power_W, from_s, from_s + h);
-    });
-    rests_[step] = room ? 0 : 1;
-  }
-}
-
-/// What the searches of the m-th of some units that are planned anew are asked. Lifetime: until the
-/// m-th is asked again, and the rests of the units are found again.
-StepQuestion DenseSearch::Ask(std::uint32_t unit, std::size_t m) {
-  occupancy_.Look(unit, &around_[m]);
-  moving_[m].clear();
-  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot) {
-    const NeighbourNeed& near = scene_.neighbours(unit)[slot];
-    if (scene_.is_place(near.unit) && !motions_.track(near.unit).legs().empty())
-      moving_[m].push_back({&scene_.arm(near.unit), &motions_.track(near.unit), near.need_mm,
-                            motions_.ToleranceOf(unit, slot)});
-  }
-  return {.arm = &scene_.arm(unit),
-          .drive = &q_.drives[unit],
-          .around = &around_[m],
-          .moving = moving_[m],
-          .standing = scene_.standing(unit),
-          .steps = occupancy_.steps(),
-          .from = q_.from[unit],
-          .to = q_.to[unit],
-          .within = RangeAround(scene_.arm(unit), q_.from[unit]),
-          .end_step = end_step_,
-          .rests = rests_};
-}
-
 /// Pre: the unit is taken out.
 bool DenseSearch::Replan(std::uint32_t unit) {
   ++replans_;
-  FindRests({&unit, 1});
-  const auto found = search_.Find(Ask(unit, 0), false);
+  questions_.FindRests({&unit, 1}, end_step_);
+  const auto found = search_.Find(questions_.Ask(unit, 0, end_step_), false);
   if (!found || !motions_.KeepsLimits(unit, found->paths)) return false;
   Set(unit, found->paths);
-  return !motions_.MeetsForGood(unit);
+  return !MeetsForGood(unit, &motions_);
 }
 
 /// Pre: the units are taken out; all are neighbours of each other.
 bool DenseSearch::ReplanTogether(std::span<const std::uint32_t> units, bool thoroughly) {
-  FindRests(units);
+  questions_.FindRests(units, end_step_);
   if (thoroughly && units.size() == 2) {
     const auto found = pair_search_.Find(
-        {.units = {Ask(units[0], 0), Ask(units[1], 1)}, .need_mm = NeedOf(units[0], units[1])});
+        {.units = {questions_.Ask(units[0], 0, end_step_), questions_.Ask(units[1], 1, end_step_)},
+         .need_mm = questions_.NeedOf(units[0], units[1])});
     if (found && Take(units, found->paths)) return true;
     for (const std::uint32_t i : units) TakeOut(i);
   }
   JointSearch::Question question;
-  question.steps = occupancy_.steps();
+  question.steps = questions_.steps();
   question.end_step = end_step_;
   std::array<JointSearch::Member, JointSearch::kMembersMax> members;
   for (std::size_t m = 0; m < units.size(); ++m) {
     const std::uint32_t i = units[m];
-    occupancy_.Look(i, &around_[m]);
-    members[m] = {.arm = &scene_.arm(i),
-                  .drive = &q_.drives[i],
-                  .around = &around_[m],
-                  .standing = scene_.standing(i),
-                  .from = q_.from[i],
-                  .to = q_.to[i],
-                  .within = RangeAround(scene_.arm(i), q_.from[i])};
+    const StepQuestion alone = questions_.Ask(i, m, end_step_);
+    members[m] = {.arm = alone.arm,
+                  .drive = alone.drive,
+                  .around = alone.around,
+                  .standing = alone.standing,
+                  .from = alone.from,
+                  .to = alone.to,
+                  .within = alone.within};
     for (std::size_t other = 0; other < m; ++other)
-      question.need_mm[other][m] = NeedOf(units[other], i);
+      question.need_mm[other][m] = questions_.NeedOf(units[other], i);
   }
   question.members = std::span(members).first(units.size());
-  question.rests = rests_;
+  question.rests = questions_.rests();
   const auto found = joint_.Find(question, &rng_);
   return found && Take(units, found->paths);
 }
@@ -256,7 +188,7 @@ bool DenseSearch::Take(std::span<const std::uint32_t> units, std::span<const Axi
   for (std::size_t m = 0; m < units.size(); ++m) {
     if (!motions_.KeepsLimits(units[m], paths[m])) return false;
     Set(units[m], paths[m]);
-    if (motions_.MeetsForGood(units[m])) return false;
+    if (MeetsForGood(units[m], &motions_)) return false;
   }
   // The members keep to one clock: they are clear of each other, but perhaps not with notice.
   for (std::size_t m = 0; m < units.size(); ++m)
@@ -299,7 +231,7 @@ void DenseSearch::Begin() {
     UpdateConflicts(i);
     end_step_ = std::max(
         end_step_,
-        static_cast<std::int32_t>(std::ceil(EndOfUnit(i) / occupancy_.steps().step_s() - 1e-6)));
+        static_cast<std::int32_t>(std::ceil(EndOfUnit(i) / questions_.steps().step_s() - 1e-6)));
   }
   if (q_.begin_with.empty()) return;
   // An order has no notice to keep.
@@ -433,7 +365,7 @@ bool DenseSearch::RepairAll(int repairs_most) {
 /// Where repairs take long more time is allowed, up to the end of the steps.
 bool DenseSearch::CompleteFirst() {
   const int repairs = std::max(kRepairsAtLeast, static_cast<int>(scene_.size()) / kUnitsPerRepair);
-  const std::int32_t most = occupancy_.steps().count - 1;
+  const std::int32_t most = questions_.steps().count - 1;
   for (int tries = 0; tries < kTriesWithMostTime; tries += end_step_ == most ? 1 : 0) {
     const std::size_t before = conflicts_.size();
     if (RepairAll(repairs)) return true;
@@ -453,7 +385,7 @@ bool DenseSearch::CutTo(std::int32_t end_step) {
   end_step_ = end_step;
   in_cut_ = true;
   before_cut_.clear();
-  const double end_s = (end_step + 1e-6) * occupancy_.steps().step_s();
+  const double end_s = (end_step + 1e-6) * questions_.steps().step_s();
   bool ok = true;
   for (std::uint32_t i = 0; i < scene_.size() && ok; ++i) {
     if (EndOfUnit(i) <= end_s) continue;
@@ -473,7 +405,7 @@ bool DenseSearch::CutTo(std::int32_t end_step) {
 }
 
 void DenseSearch::Improve() {
-  const double h = occupancy_.steps().step_s();
+  const double h = questions_.steps().step_s();
   const double begun_s = Work_s();
   int failures = 0;
   double share = kCutShare;

@@ -5,11 +5,11 @@
 // has a way that ends in time, whether or not it meets others. A few units around one conflict are
 // taken out and planned anew, one after the other, each so that it meets the others as little as
 // possible (soft_search.h); two that are hooked into each other are planned together
-// (joint_search.h). Units that the new ways meet are planned anew, too. The change stays if there
-// are no more conflicts than before. Once there are none the plan is complete, and the time is cut:
-// units that end too late are planned anew within less time, and what they meet is repaired in the
-// same manner. Where that finds no end all move as before. The plan is therefore never worse, and
-// may be taken at any time.
+// (joint_search.h, pair_search.h). Units that the new ways meet are planned anew, too. The change
+// stays if there are no more conflicts than before. Once there are none the plan is complete, and
+// the time is cut: units that end too late are planned anew within less time, and what they meet is
+// repaired in the same manner. Where that finds no end all move as before. The plan is therefore
+// never worse, and may be taken at any time.
 //
 // The work is counted, not timed: the same request and budget give the same bits on every machine.
 #pragma once

@@ -82,16 +82,6 @@ bool Motions::Meet(std::uint32_t unit, std::uint32_t slot) {
   return answer.meet;
 }
 
-bool Motions::MeetsForGood(std::uint32_t unit) {
-  const Track& own = tracks_[unit];
-  for (const StandingThing& thing : scene_.standing(unit))
-    if (own.moves() && !PassesClearOf(scene_.arm(unit), own, thing.capsule, thing.need_mm))
-      return true;
-  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot)
-    if (q_.movable[scene_.neighbours(unit)[slot].unit] == 0 && Meet(unit, slot)) return true;
-  return false;
-}
-
 double Motions::Cost(std::uint32_t unit, const Track& track, double limit) {
   // A unit that merely stands was not brought there by this plan.
   for (const StandingThing& thing : scene_.standing(unit))
@@ -153,6 +143,19 @@ void Motions::MoveInto(LocalSearchResult* result) {
         result->without_notice.emplace_back(i, j);
   result->paths = std::move(paths_);
   result->tracks = std::move(tracks_);
+}
+
+bool MeetsForGood(std::uint32_t unit, Motions* motions) {
+  const Scene& scene = motions->scene();
+  const Track& own = motions->track(unit);
+  for (const StandingThing& thing : scene.standing(unit))
+    if (own.moves() && !PassesClearOf(scene.arm(unit), own, thing.capsule, thing.need_mm))
+      return true;
+  for (std::uint32_t slot = 0; slot < scene.neighbours(unit).size(); ++slot)
+    if (motions->request().movable[scene.neighbours(unit)[slot].unit] == 0 &&
+        motions->Meet(unit, slot))
+      return true;
+  return false;
 }
 
 }  // namespace focalfleet

@@ -58,8 +58,6 @@ class Motions {
   /// The present motions of the unit and of its neighbour in this slot are in conflict. The answer
   /// is kept until either has another motion.
   [[nodiscard]] bool Meet(std::uint32_t unit, std::uint32_t slot);
-  /// The present motion of the unit meets something that never moves.
-  [[nodiscard]] bool MeetsForGood(std::uint32_t unit);
   /// Sum of the weights of the neighbours that `track` meets; at least `limit` once that is
   /// reached. kNever: it meets something that never moves.
   double Cost(std::uint32_t unit, const Track& track, double limit);
@@ -114,5 +112,8 @@ class Motions {
   std::vector<Before> before_;  // in the order in which units were replaced in the trial
   std::vector<std::vector<std::uint8_t>> unnoticed_before_;
 };
+
+/// The present motion of the unit meets something that never moves.
+bool MeetsForGood(std::uint32_t unit, Motions* motions);
 
 }  // namespace focalfleet

@@ -7,7 +7,7 @@
 namespace focalfleet {
 namespace {
 
-/// A cell is too near where its middle is: a core may pass it at half a cell's width. Of a cell.
+/// A cell is too near where its middle is: a core may pass it at half a cell's width. Units: cells.
 constexpr double kMargin = 0.5;
 constexpr double kCellsPerNeed = 4;
 

@@ -7,7 +7,8 @@
 namespace focalfleet {
 namespace {
 
-/// So near to start or target the raster is too coarse for arms that stand almost touching.
+/// Within so many steps of start or target the raster is too coarse for arms that stand almost
+/// touching.
 constexpr std::int32_t kTightSteps = 1;
 /// Between two samples of an arm it is nearer to what is around by an eighth of a cell at most: a
 /// cell is a quarter of the distance that it keeps.

@@ -1,5 +1,5 @@
 // A unit's square of angles as a grid of poses, a step of time from each to its neighbours, and for
-// each pose the steps in which it is free of all others. One bit stands for a pose. A whole column
+// each pose the steps in which it is free of all others. Each pose has one bit. A whole column
 // of poses (one theta, all phi) is one word, so that one operation on a word decides about all of
 // them, and a search over all poses and times takes as long as a few hundred distances of arms.
 //
@@ -72,7 +72,7 @@ struct StepWords {
 void RasterBitsAt(const SegmentFp& line, const Surround& around, const StepWords& words,
                   std::uint64_t* bits);
 
-/// What a search for one unit's way is asked.
+/// The question to a search for one unit's way.
 struct StepQuestion {
   const ArmGeometry* arm = nullptr;
   const UnitDrive* drive = nullptr;

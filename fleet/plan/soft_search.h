@@ -34,7 +34,8 @@ class SoftSearch {
   [[nodiscard]] std::uint64_t work() const { return work_; }
 
  private:
-  /// By steps from where the sets begin: the start, or the target where the unit goes late.
+  /// Steps are counted from where the sets begin: the start, or the target where the unit goes
+  /// late.
   struct View {
     const StepQuestion* q = nullptr;
     bool late = false;

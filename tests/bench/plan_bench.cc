@@ -92,7 +92,7 @@ struct Drawn {
   std::vector<std::uint8_t> frozen;
 };
 
-/// So many percent of the units stand where they start, whatever comes.
+/// A percentage of the units stands where they start, whatever comes.
 Result<Drawn> DrawnFrom(const Layout& layout, std::span<const UnitDrive> drives, std::uint64_t seed,
                         int broken_percent) {
   const std::size_t n = layout.size();
