@@ -95,8 +95,6 @@ class SectorAgent {
   [[nodiscard]] const PlaneEpoch& accepted() const { return accepted_; }
   /// The plane's number of the last round that was taken; 0: none.
   [[nodiscard]] std::uint64_t round() const { return round_.number; }
-  /// None: no coordinator was heard yet.
-  [[nodiscard]] std::optional<HostInstant> ordered_at() const { return ordered_at_; }
 
  private:
   /// A neighbour in the present round.
