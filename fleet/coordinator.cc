@@ -233,10 +233,10 @@ const UnitView& Coordinator::unit(PositionerIndex i) const { return impl_->units
 
 UnitKnowledge Coordinator::KnowledgeAt(PositionerIndex i, HostInstant now) const {
   const UnitView& view = unit(i);
-  const UnitKnowledge* const before = impl_->executor().BeforeOf(i);
+  const UnitKnowledge* const before = impl_->executor().round().BeforeOf(i);
   if (before != nullptr && (view.phase == UnitPhase::kArmed || view.phase == UnitPhase::kReady))
     return *before;
-  const auto course = impl_->executor().CourseOf(i);
+  const auto course = impl_->executor().round().CourseOf(i);
   if (!course || view.phase != UnitPhase::kMoving) return view.knowledge;
   UnitKnowledge predicted;
   for (const Axis axis : kAxes)

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 
 #include "fleet/coordinate/commands.h"
@@ -51,14 +50,8 @@ class ConfigurationExecutor {
   [[nodiscard]] const ConfigurationView& view() const { return rooms_.configuration.view; }
   [[nodiscard]] bool busy() const { return rooms_.configuration.busy(); }
   [[nodiscard]] HostInstant due() const;
-  /// See Round::CourseOf.
-  [[nodiscard]] std::optional<Round::Course> CourseOf(PositionerIndex i) const {
-    return rooms_.round.CourseOf(i);
-  }
-  /// See Round::BeforeOf.
-  [[nodiscard]] const UnitKnowledge* BeforeOf(PositionerIndex i) const {
-    return rooms_.round.BeforeOf(i);
-  }
+  /// What is known of units that take part in the round under way.
+  [[nodiscard]] const Round& round() const { return rooms_.round; }
 
  private:
   [[nodiscard]] Status MayBegin(const std::string& source) const;

@@ -63,9 +63,9 @@ TEST(Configuration, UnitThatHasNotBegunIsShownWhereItStands) {
           const UnitKnowledge& known = coordinator.unit({n}).knowledge;
           for (const std::size_t a : {0u, 1u}) {
             EXPECT_EQ(shown[a].low, shown[a].high) << n;
-            if (known[a].witness == Witness::kInterval) ++intended;
-            if (known[a].witness == Witness::kInterval)
-              EXPECT_TRUE(known[a].low <= shown[a].low && shown[a].low <= known[a].high) << n;
+            if (known[a].witness != Witness::kInterval) continue;
+            ++intended;
+            EXPECT_TRUE(known[a].low <= shown[a].low && shown[a].low <= known[a].high) << n;
           }
         }
         return coordinator.configuration().state == ConfigurationState::kMoving;

@@ -64,7 +64,9 @@ TEST(MedianCurve, FollowsASignThatLengthsHide) {
   const MedianCurve curve = MedianAlong(x, y);
   ASSERT_GT(curve.x.size(), 10u);
   for (std::size_t k = 0; k < curve.x.size(); ++k)
-    if (std::abs(curve.x[k]) > 30) EXPECT_EQ(curve.median[k], curve.x[k] < 0 ? -1 : 1) << k;
+    if (std::abs(curve.x[k]) > 30) {
+      EXPECT_EQ(curve.median[k], curve.x[k] < 0 ? -1 : 1) << k;
+    }
   EXPECT_GT(curve.structure, 100);
 }
 
@@ -106,7 +108,9 @@ TEST(OrderSpectrum, HasThePeakOfARipple) {
   EXPECT_EQ(spectrum.chance_deg, 0) << "nothing is left after the model";
   const OrderSpectrum other = SpectrumOf(turned.campaign, residuals, kPhi);
   for (const double amplitude : other.before_deg)
-    if (std::isfinite(amplitude)) EXPECT_LT(amplitude, 0.02 * kAmplitude_deg);
+    if (std::isfinite(amplitude)) {
+      EXPECT_LT(amplitude, 0.02 * kAmplitude_deg);
+    }
 }
 
 TEST(OrderSpectrum, ReachesTheMotorsOwnOrders) {
