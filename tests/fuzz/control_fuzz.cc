@@ -56,8 +56,10 @@ void CheckUnits(const Command& command) {
           FOCALFLEET_CHECK(what.targets.size() == kUnitCount);
         } else if constexpr (std::is_same_v<What, KeepRowsCommand>) {
           FOCALFLEET_CHECK(false);  // the request handler makes it itself
-        } else {
+        } else if constexpr (requires { what.unit; }) {
           exists(what.unit);
+        } else {
+          FOCALFLEET_CHECK(false);  // rounds of a plane come through DDS alone
         }
       },
       command.what);
