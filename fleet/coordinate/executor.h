@@ -50,7 +50,7 @@ class ConfigurationExecutor {
   [[nodiscard]] const ConfigurationView& view() const { return rooms_.configuration.view; }
   [[nodiscard]] bool busy() const { return rooms_.configuration.busy(); }
   [[nodiscard]] HostInstant due() const;
-  /// What is known of units that take part in the round under way.
+  /// The round under way, with the courses of its units and what was known of them before.
   [[nodiscard]] const Round& round() const { return rooms_.round; }
 
  private:
