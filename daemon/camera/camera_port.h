@@ -24,8 +24,8 @@ class CameraPort {
   /// Errors: kInvalid: the data received is no exposure; kUnavailable: nothing can arrive at all.
   /// The next call may succeed.
   virtual Result<std::optional<Exposure>> Take() = 0;
-  /// There are new credentials, for a port that uses any; those in use end at `end`. Any thread may
-  /// call.
+  /// New credentials have replaced those in use, which end at `end`. A port without credentials
+  /// ignores the call. Any thread may call.
   virtual void Renew(WallTime /*end*/) {}
 };
 

@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
+#include <utility>
 
 #include "daemon/report/plate_plot.h"
 #include "daemon/report/ticks.h"
+#include "sim/campaigns/diagnosis/chances.h"
 
 namespace focalfleet {
 namespace {
@@ -24,25 +25,23 @@ constexpr std::size_t kDotsMax = 1500;
 constexpr std::size_t kColumnsShown = 6, kColumnsLeast = 2;
 constexpr double kStructureShown = 1;  // chi-square a bin beyond what chance makes
 constexpr std::size_t kAmplitudeMapsMax = 4;
-constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNotKnown = sim::HeldOutGain::kNotKnown;
 
-double MedianOf(std::vector<double> values) {
+std::vector<double> KnownOf(std::vector<double> values) {
   std::erase_if(values, [](double value) { return !std::isfinite(value); });
-  if (values.empty()) return kNotKnown;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
+  return values;
+}
+
+double MedianOf(const std::vector<double>& values) {
+  std::vector<double> known = KnownOf(values);
+  return known.empty() ? kNotKnown : sim::Median(std::move(known));
 }
 
 /// The bounds of all but `tail` of the values at either end; 0 and 0 without values.
-std::array<double, 2> BoundsOf(std::vector<double> values, double tail) {
-  std::erase_if(values, [](double value) { return !std::isfinite(value); });
-  if (values.empty()) return {0, 0};
-  std::ranges::sort(values);
-  const auto at = [&](double share) {
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-  };
-  return {at(tail), at(1 - tail)};
+std::array<double, 2> BoundsOf(const std::vector<double>& values, double tail) {
+  const std::vector<double> known = KnownOf(values);
+  if (known.empty()) return {0, 0};
+  return {sim::Quantile(known, tail), sim::Quantile(known, 1 - tail)};
 }
 
 /// Every so many of two columns, for dots that are not to hide each other.
@@ -152,6 +151,8 @@ std::string KnownOrder(double order, double gear) {
 /// resolved.
 std::vector<report::Reference> PeaksOf(const sim::OrderSpectrum& spectrum, double gear,
                                        double turns) {
+  // Amplitudes, as multiples of what chance makes and of the spectrum's median. Chance alone
+  // exceeds three times its root mean square at one order of 8000 (exp(-9), a Rayleigh tail).
   constexpr double kOfChance = 3, kOfMedian = 1.7;
   constexpr std::size_t kPeaksMax = 3;
   const std::vector<double>& y = spectrum.before_deg;

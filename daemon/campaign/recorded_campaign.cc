@@ -99,7 +99,7 @@ class Poses {
 
   /// Takes in what the configuration moved.
   Status Follow(std::uint64_t configuration) {
-    // Whoever does not move again stands where it went.
+    // A unit that does not move again stands where its last move ended.
     for (auto& [unit, step] : steps_) step.from = step.to;
     for (std::uint64_t after = 0;;) {
       FOCALFLEET_TRY_ASSIGN(const ReplayPage page,

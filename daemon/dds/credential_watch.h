@@ -21,7 +21,8 @@ class CredentialWatch {
     std::string folder;
     /// All functions are called on the thread of the watch.
     std::function<void(const ShellNote&)> note = [](const ShellNote&) {};
-    /// There are other credentials. Those in use end at `end`; the latest time there is: unknown.
+    /// Called when other credentials have replaced those in use. `end` is when those in use end,
+    /// and the largest WallTime where that is not known.
     std::function<void(WallTime end)> renew = [](WallTime) {};
     /// Receives each new reason why the files cannot be read.
     std::function<void(const std::string&)> tell = [](const std::string&) {};

@@ -55,7 +55,8 @@ QosOwner PassingQos(std::int32_t depth, const std::string& partition) {
   return qos;
 }
 
-QosOwner SharedQos() {
+/// For states: readers that join later get the last one of each instance.
+QosOwner SharedQos(const std::string& partition) {
   QosOwner qos(dds_create_qos());
   // The blocking time is 0: a writer whose readers lag refuses the sample, and the tick goes on.
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
@@ -63,6 +64,7 @@ QosOwner SharedQos() {
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
   dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, kLease);
   dds_qset_writer_data_lifecycle(qos.get(), false);
+  SetPartition(partition, qos.get());
   return qos;
 }
 
@@ -135,7 +137,7 @@ Domain::~Domain() {
 Result<Participant> Participant::Join(const DdsOptions& options) {
   Participant participant;
   FOCALFLEET_TRY_ASSIGN(participant.domain_, Domain::Acquire(options));
-  std::unique_ptr<dds_qos_t, DeleteQos> qos;
+  QosOwner qos;
   if (!options.security.empty()) {
     qos.reset(dds_create_qos());
     for (const auto& [name, value] : SecurityProperties(options.security))
@@ -147,6 +149,22 @@ Result<Participant> Participant::Join(const DdsOptions& options) {
   return participant;
 }
 
+namespace {
+
+Result<Handle> WriterWith(const QosOwner& qos, const Participant& participant, Handle topic) {
+  const dds_entity_t writer = dds_create_writer(participant.get(), topic, qos.get(), nullptr);
+  if (writer < 0) return DdsFailure("make a writer", writer);
+  return writer;
+}
+
+Result<Handle> ReaderWith(const QosOwner& qos, const Participant& participant, Handle topic) {
+  const dds_entity_t reader = dds_create_reader(participant.get(), topic, qos.get(), nullptr);
+  if (reader < 0) return DdsFailure("make a reader", reader);
+  return reader;
+}
+
+}  // namespace
+
 Result<Handle> MakeTopic(const Participant& participant, const dds_topic_descriptor& type,
                          const char* name) {
   const dds_entity_t topic = dds_create_topic(participant.get(), &type, name, nullptr, nullptr);
@@ -156,36 +174,22 @@ Result<Handle> MakeTopic(const Participant& participant, const dds_topic_descrip
 
 Result<Handle> MakeWriter(const Participant& participant, Handle topic,
                           const std::string& partition) {
-  const QosOwner qos = SharedQos();
-  SetPartition(partition, qos.get());
-  const dds_entity_t writer = dds_create_writer(participant.get(), topic, qos.get(), nullptr);
-  if (writer < 0) return DdsFailure("make a writer", writer);
-  return writer;
+  return WriterWith(SharedQos(partition), participant, topic);
 }
 
 Result<Handle> MakeReader(const Participant& participant, Handle topic,
                           const std::string& partition) {
-  const QosOwner qos = SharedQos();
-  SetPartition(partition, qos.get());
-  const dds_entity_t reader = dds_create_reader(participant.get(), topic, qos.get(), nullptr);
-  if (reader < 0) return DdsFailure("make a reader", reader);
-  return reader;
+  return ReaderWith(SharedQos(partition), participant, topic);
 }
 
 Result<Handle> MakeListener(const Participant& participant, Handle topic, std::int32_t depth,
                             const std::string& partition) {
-  const QosOwner qos = PassingQos(depth, partition);
-  const dds_entity_t reader = dds_create_reader(participant.get(), topic, qos.get(), nullptr);
-  if (reader < 0) return DdsFailure("make a reader", reader);
-  return reader;
+  return ReaderWith(PassingQos(depth, partition), participant, topic);
 }
 
 Result<Handle> MakeTalker(const Participant& participant, Handle topic, std::int32_t depth,
                           const std::string& partition) {
-  const QosOwner qos = PassingQos(depth, partition);
-  const dds_entity_t writer = dds_create_writer(participant.get(), topic, qos.get(), nullptr);
-  if (writer < 0) return DdsFailure("make a writer", writer);
-  return writer;
+  return WriterWith(PassingQos(depth, partition), participant, topic);
 }
 
 }  // namespace focalfleet::dds_internal

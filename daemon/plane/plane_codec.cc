@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "daemon/journal/fields.h"
 #include "protocol/base/limits.h"
@@ -10,10 +9,11 @@
 namespace focalfleet {
 namespace {
 
-// Instants and spans of a host's clock stay below 200 years, so that sums do not overflow.
+// Instants and spans of a host's clock stay below 73 years, so that sums of four do not overflow.
 constexpr std::int64_t kClockMost_ns = INT64_MAX / 4;
-bool IsClock(HostInstant at) { return std::abs(at.ns) <= kClockMost_ns; }
-bool IsClock(DurationNs time) { return std::abs(time.ns) <= kClockMost_ns; }
+bool IsWithin(std::int64_t value, std::int64_t most) { return -most <= value && value <= most; }
+bool IsClock(HostInstant at) { return IsWithin(at.ns, kClockMost_ns); }
+bool IsClock(DurationNs time) { return IsWithin(time.ns, kClockMost_ns); }
 /// Also the two ends of time.
 bool IsTime(HostInstant at) { return IsClock(at) || at == kNever || at.ns == INT64_MIN; }
 
@@ -28,7 +28,7 @@ bool IsGood(const ApplyCommand& apply) {
     return false;
   return std::ranges::all_of(apply.targets, [](const std::optional<Pose>& target) {
     return !target || std::ranges::all_of(*target, [](std::int64_t vectors) {
-      return std::abs(vectors) <= limits::kPositionMax;
+      return IsWithin(vectors, limits::kPositionMax);
     });
   });
 }

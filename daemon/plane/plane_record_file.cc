@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "daemon/files/text_file.h"
@@ -31,9 +32,19 @@ tl::unexpected<Error> Bad(const std::string& path, const std::string& why) {
   return Fail(ErrorCode::kInvalid, path + ": this is no record of a plane: " + why);
 }
 
+/// Empty: beyond all ranges. Pre: an integer.
+std::optional<std::int32_t> VectorsOf(const json& number) {
+  if (number.is_number_unsigned() && number.get<std::uint64_t>() > INT64_MAX) return std::nullopt;
+  const auto vectors = number.get<std::int64_t>();
+  if (vectors < -limits::kPositionMax || vectors > limits::kPositionMax) return std::nullopt;
+  return static_cast<std::int32_t>(vectors);
+}
+
 Result<PlaneConfiguration> ConfigurationOf(const json& from, const std::string& path,
                                            const Layout& layout) {
-  if (!from.is_object() || !from["id"].is_number_unsigned() || !from["source"].is_string() ||
+  const auto has = [&from](const char* key) { return from.is_object() && from.contains(key); };
+  if (!has("id") || !has("source") || !has("fixed") || !has("targets") ||
+      !from["id"].is_number_unsigned() || !from["source"].is_string() ||
       !from["fixed"].is_boolean() || !from["targets"].is_array())
     return Bad(path, "the configuration under way");
   PlaneConfiguration configuration{.id = from["id"].get<std::uint64_t>(),
@@ -45,12 +56,13 @@ Result<PlaneConfiguration> ConfigurationOf(const json& from, const std::string& 
     if (!row.is_array() || row.size() != 4 || !row[0].is_number_unsigned() ||
         !row[1].is_number_integer() || !row[2].is_number_integer() || !row[3].is_string())
       return Bad(path, "a target");
-    const auto unit = layout.Find(UnitId{row[0].get<std::uint32_t>()});
-    const std::int64_t theta = row[1].get<std::int64_t>(), phi = row[2].get<std::int64_t>();
-    if (!unit || std::abs(theta) > limits::kPositionMax || std::abs(phi) > limits::kPositionMax)
+    const auto id = row[0].get<std::uint64_t>();
+    const auto unit = id <= UINT32_MAX ? layout.Find(UnitId{static_cast<std::uint32_t>(id)})
+                                       : std::optional<PositionerIndex>();
+    const std::optional<std::int32_t> theta = VectorsOf(row[1]), phi = VectorsOf(row[2]);
+    if (!unit || !theta || !phi)
       return Bad(path, "a target of a unit that the units file has not, or beyond all ranges");
-    configuration.targets[unit->value] =
-        Pose{static_cast<std::int32_t>(theta), static_cast<std::int32_t>(phi)};
+    configuration.targets[unit->value] = Pose{*theta, *phi};
     configuration.target_ids[unit->value] = row[3].get<std::string>();
   }
   return configuration;

@@ -144,7 +144,7 @@ void DenseSearch::UpdateConflicts(std::uint32_t unit) {
 bool DenseSearch::Replan(std::uint32_t unit) {
   ++replans_;
   questions_.FindRests({&unit, 1}, end_step_);
-  const auto found = search_.Find(questions_.Ask(unit, 0, end_step_), false);
+  const auto found = search_.Find(questions_.Ask(unit, 0, end_step_));
   if (!found || !motions_.KeepsLimits(unit, found->paths)) return false;
   Set(unit, found->paths);
   return !MeetsForGood(unit, &motions_);

@@ -5,8 +5,7 @@
 // the unit can have reached by then with at most c such steps. A set follows from the sets of the
 // step before by a few operations on words, for all poses at once. The first level that reaches the
 // target is the least. The way is then read backwards, and stands wherever that is possible: the
-// unit goes as early as it can. Read forwards from sets that are spread backwards from the target,
-// it goes as late as it can.
+// unit goes as early as it can.
 //
 // The raster tells roughly what is too near, so the way found must be proven as a motion in time
 // (track.h).
@@ -27,31 +26,21 @@ class SoftSearch {
     std::int32_t meets = 0;  // steps in which the raster is not free
   };
 
-  /// Empty: no way ends in time, or it has more segments than a move holds. `late`: as late as it
-  /// can, and not as early.
-  std::optional<Found> Find(const StepQuestion& question, bool late);
+  /// Empty: no way ends in time, or it has more segments than a move holds.
+  std::optional<Found> Find(const StepQuestion& question);
   /// Words of sets so far: what the searches cost.
   [[nodiscard]] std::uint64_t work() const { return work_; }
 
  private:
-  /// Steps are counted from where the sets begin: the start, or the target where the unit goes
-  /// late.
-  struct View {
-    const StepQuestion* q = nullptr;
-    bool late = false;
-    [[nodiscard]] std::int32_t StepAt(std::int32_t k) const {
-      return late ? q->end_step - 1 - k : k;
-    }
-  };
-
   [[nodiscard]] std::uint64_t* Level(std::int32_t level, std::int32_t k) {
     return levels_[static_cast<std::size_t>(level)].data() +
            static_cast<std::size_t>(k) * grid_.words();
   }
-  void SpreadLevel(const View& view, std::int32_t level, bool all_free);
-  [[nodiscard]] std::optional<AxisPaths> Read(const View& view, std::int32_t level, bool all_free);
-  [[nodiscard]] bool CameFrom(const View& view, const GridPose& before, const GridPose& after,
-                              std::int32_t k, std::int32_t* level, bool all_free);
+  void SpreadLevel(const StepQuestion& question, std::int32_t level, bool all_free);
+  [[nodiscard]] std::optional<AxisPaths> Read(const StepQuestion& question, std::int32_t level,
+                                              bool all_free);
+  [[nodiscard]] bool CameFrom(const GridPose& before, const GridPose& after, std::int32_t step,
+                              std::int32_t* level, bool all_free);
 
   PoseGrid grid_;
   FreePoses free_;

@@ -116,14 +116,13 @@ export async function past(browser) {
   await tab.click("#player-close");
   assert.ok(await tab.locator("#player").isHidden());
 
-  say("after a new daemon the rows are not kept, and the page says that, too");
+  say("a new daemon still has the rows of the plan");
   await world("stop-daemon");
   await world("start-daemon");
   await isLive(tab);
   await openEarlier(tab);
   await tab.getByRole("button", {name: "Replay configuration 1"}).click();
-  await textOf(tab, "#player-note", "Even motion between the recorded beginning and end of each move: " +
-      "the rows of the plan are not kept.");
+  await textOf(tab, "#player-note", "By the rows of its plan.");
   await seek(tab, 0);
   assert.ok(apart(before, await fibres(tab)) < 0.05);
   await seek(tab, 1);
@@ -286,7 +285,7 @@ export async function study(browser) {
   say("what the daemon measured itself is diagnosed, too");
   await textOf(tab, "#recordings", /Night of \d{4}-\d\d-\d\d: 1 configuration from 1 on/);
   await tab.click("#diagnose-recording");
-  await textOf(tab, "#diagnosis", /Night of .* by operator-page/);
+  await textOf(tab, "#diagnosis", /Night of .* by token operator-page/);
   await textOf(tab, "#diagnosis-report .lead", /These data are not enough for a verdict/);
   await chooseCampaign(tab);
   await textOf(tab, "#diagnosis-report .card h3", /^backlash of theta/);

@@ -45,6 +45,7 @@ struct OrderSpectrum {
 /// multiplications a row.
 OrderSpectrum SpectrumOf(const Campaign& campaign, const AngleResiduals& residuals,
                          std::size_t axis);
+/// Some 40 million multiplications. Half or twice of it changes the noise of
 inline constexpr std::size_t kSpectrumRows = 40'000;
 
 /// Root mean square of each unit's residuals. NaN: never measured. Shape: (units).

@@ -126,7 +126,7 @@ TEST(DiagnosePatch, TellsTheEmpiricalTermAndLeavesTheVerdict) {
   const auto result = Focalfleet({"diagnose", scratch / "night", "--out", scratch / "report",
                                   "--without", "stage_ripple", "--patch"});
   ASSERT_EQ(result.exit, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("Unknown: "));
+  EXPECT_THAT(result.out, HasSubstr("Something is wrong by "));
   EXPECT_THAT(result.out, HasSubstr("patched by empirical terms"));
   EXPECT_THAT(result.out, HasSubstr("empirical_ripple"));
   const Json report = Json::parse(Slurp(scratch / "report/report.json"));
@@ -263,7 +263,7 @@ TEST(Diagnose, TellsNoFiguresOfACampaignThatIsTooShort) {
             0);
   const auto result = Focalfleet({"diagnose", scratch / "night", "--out", scratch / "report"});
   ASSERT_EQ(result.exit, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("Insufficient: no unit was seen after 8 moves"));
+  EXPECT_THAT(result.out, HasSubstr("not enough for a verdict: no unit was seen after 8 moves"));
   const Json gain = Json::parse(Slurp(scratch / "report/report.json"))["gain"];
   for (const char* figure :
        {"rms_before_um", "rms_after_um", "noise_floor_um", "mad_after_um", "explained_fraction"})

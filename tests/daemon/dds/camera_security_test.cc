@@ -21,7 +21,7 @@
 #include "daemon/dds/credentials.h"
 #include "tests/daemon/dds/client_process.h"
 #include "tests/daemon/dds/own_domain.h"
-#include "tests/support/scratch_folder.h"
+#include "tests/daemon/dds/secured_domain.h"
 
 namespace focalfleet {
 namespace {
@@ -94,15 +94,8 @@ std::pair<Packet, bool> AsIfLater(Packet packet) {
   return {std::move(packet), has_sample};
 }
 
-class CameraSecurity : public ::testing::Test {
+class CameraSecurity : public test::SecuredDomain {
  protected:
-  void MakeKeys(const std::string& options, const std::string& environment = "") {
-    const std::string command = environment + " " MAKE_KEYS " " + (folder_ / "keys") +
-                                " --domain " + std::to_string(OwnDomain()) + " " + options +
-                                " > /dev/null";
-    ASSERT_EQ(std::system(command.c_str()), 0) << command;
-  }
-  [[nodiscard]] std::string Keys(const std::string& who) const { return folder_ / ("keys/" + who); }
   [[nodiscard]] std::unique_ptr<CameraDds> Port() const {
     return std::make_unique<CameraDds>(CameraDds::Options{
         .dds = {.domain = OwnDomain(), .config_xml = {}, .security = Keys("daemon")},
@@ -148,8 +141,6 @@ class CameraSecurity : public ::testing::Test {
     } while (std::chrono::steady_clock::now() < until);
     return "";
   }
-
-  test::ScratchFolder folder_;
 };
 
 TEST_F(CameraSecurity, RenewedCredentialsOutliveTheOldAndNoExposureIsLost) {
@@ -172,8 +163,9 @@ TEST_F(CameraSecurity, RenewedCredentialsOutliveTheOldAndNoExposureIsLost) {
   }
   ASSERT_LT(WallTime::Now().ns, end.ns)
       << "this machine is too slow for credentials that end in " << lasts_s << " s";
-  while (WallTime::Now().ns < end.ns + 3'000'000'000)
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  // DDS cuts a participant off some time after its credentials end.
+  std::this_thread::sleep_for(
+      std::chrono::nanoseconds(end.ns + 3'000'000'000 - WallTime::Now().ns));
   for (std::uint64_t id = 5; id <= 7; ++id)
     EXPECT_EQ(Ask(port.get(), id), "good-" + std::to_string(id)) << "after the old end";
 }

@@ -24,7 +24,7 @@
 #include "focalfleet.h"  // generated from focalfleet.idl
 #include "tests/daemon/dds/client_process.h"
 #include "tests/daemon/dds/own_domain.h"
-#include "tests/support/scratch_folder.h"
+#include "tests/daemon/dds/secured_domain.h"
 
 namespace focalfleet {
 namespace {
@@ -36,17 +36,10 @@ using ::testing::HasSubstr;
 constexpr std::chrono::seconds kPatience(60);  // far above anything that is measured
 constexpr std::uint32_t kUnits = 100;
 
-class DdsSecurity : public ::testing::Test {
+class DdsSecurity : public test::SecuredDomain {
  protected:
   DdsSecurity() { MakeKeys(""); }
 
-  void MakeKeys(const std::string& options, const std::string& environment = "") {
-    const std::string command = environment + " " MAKE_KEYS " " + (folder_ / "keys") +
-                                " --domain " + std::to_string(OwnDomain()) + " " + options +
-                                " > /dev/null";
-    ASSERT_EQ(std::system(command.c_str()), 0) << command;
-  }
-  [[nodiscard]] std::string Keys(const std::string& who) const { return folder_ / ("keys/" + who); }
   [[nodiscard]] ClientProcess Talker(const std::string& who) const {
     return ClientProcess(
         {TALKER, std::to_string(OwnDomain()), std::to_string(kUnits), "0", Keys(who)});
@@ -92,8 +85,6 @@ class DdsSecurity : public ::testing::Test {
       line = Next(watcher);
     return line;
   }
-
-  test::ScratchFolder folder_;
 };
 
 TEST_F(DdsSecurity, AMonitorReadsAllAndAnOutsiderNothing) {

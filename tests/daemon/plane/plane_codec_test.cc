@@ -91,6 +91,9 @@ TEST(PlaneCodec, RefusesCodesAndListsBeyondTheirLimits) {
   order = AnOrder();
   order.ahead = DurationNs{INT64_MAX};
   EXPECT_FALSE(DecodePlaneOrder(Encode(order)).has_value());
+  order = AnOrder();
+  order.sent = HostInstant{INT64_MIN};
+  EXPECT_FALSE(DecodePlaneOrder(Encode(order)).has_value());
   SectorReport report = AReport();
   report.stage = static_cast<SectorStage>(kSectorStageCount);
   EXPECT_FALSE(DecodeSectorReport(Encode(report)).has_value());

@@ -70,7 +70,13 @@ TEST(PlaneRecordFile, RefusesWhatIsNone) {
        "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
        "\"s\",\"fixed\":false,\"targets\":[[999,1,1,\"\"]]}}",
        "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
-       "\"s\",\"fixed\":false,\"targets\":[[1,99999999999,1,\"\"]]}}"}) {
+       "\"s\",\"fixed\":false,\"targets\":[[1,99999999999,1,\"\"]]}}",
+       "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
+       "\"s\",\"fixed\":false,\"targets\":[[1,-9223372036854775808,1,\"\"]]}}",
+       "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
+       "\"s\",\"fixed\":false,\"targets\":[[1,18446744073709551615,1,\"\"]]}}",
+       "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
+       "\"s\",\"fixed\":false,\"targets\":[[4294967297,1,1,\"\"]]}}"}) {
     const test::ScratchFolder scratch;
     std::ofstream(scratch / "plane.json") << text;
     const auto file = PlaneRecordFile::Open(scratch / "plane.json", layout, 5);

@@ -82,15 +82,13 @@ TEST(SoftSearch, MeetsOthersInAsFewStepsAsAnyWay) {
     const int least = here.LeastMet();
     met += least;
     SoftSearch search;
-    for (const bool late : {false, true}) {
-      const auto found = search.Find(here.question, late);
-      ASSERT_TRUE(found);
-      EXPECT_EQ(found->meets, least);
-      Pose at = here.question.from;
-      for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-        for (const Segment& segment : found->paths[axis].segments()) at[axis] += segment.delta;
-      EXPECT_EQ(at, here.question.to);
-    }
+    const auto found = search.Find(here.question);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->meets, least);
+    Pose at = here.question.from;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      for (const Segment& segment : found->paths[axis].segments()) at[axis] += segment.delta;
+    EXPECT_EQ(at, here.question.to);
   }
   EXPECT_GT(met, 0) << "nothing was in the way";
 }
@@ -102,7 +100,7 @@ TEST(SoftSearch, RestsWherePowerHasNoRoom) {
   std::fill(rests.begin() + 5, rests.begin() + 12, 1);
   here.question.rests = rests;
   SoftSearch search;
-  const auto found = search.Find(here.question, false);
+  const auto found = search.Find(here.question);
   ASSERT_TRUE(found);
   const double h = here.steps.step_s();
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
