@@ -35,7 +35,6 @@ constexpr std::array<std::string_view, 8> kFixedColumns = {
 constexpr std::string_view kWordColumn = "mode";
 constexpr std::array<std::string_view, 2> kFlagColumns = {"rehomed", "from_measured"};
 constexpr std::string_view kTimeColumn = "t_s";
-constexpr std::array<std::string_view, 3> kModes = {"asymmetric", "five_segment", "seven_segment"};
 
 // Columns of numbers that docs/files.md names, each with the values that it may have. A word in one
 // of them is an error, not another kind of column.
@@ -141,7 +140,7 @@ class MoreColumns {
       const std::string& name = table.known_as(column);
       if (std::ranges::count(kFixedColumns, name) > 0) continue;
       if (name == kWordColumn) {
-        modes_ = sim::WordColumn{name, {kModes.begin(), kModes.end()}, {}};
+        modes_ = sim::WordColumn{name, {sim::kDriveModes.begin(), sim::kDriveModes.end()}, {}};
       } else if (IsKnown(name) || ReasonToPassOver(table, column).empty()) {
         covariates_.push_back({name, {}});
       } else {
@@ -221,10 +220,10 @@ class MoreColumns {
   static int ModeOf(CsvRow* row) {
     if (!row->Has(kWordColumn)) return -1;
     const std::string word = row->Text(kWordColumn);
-    const auto* it = std::ranges::find(kModes, word);
-    if (it == kModes.end())
+    const auto* it = std::ranges::find(sim::kDriveModes, word);
+    if (it == sim::kDriveModes.end())
       row->Reject(kWordColumn, Quoted(word) + " is not asymmetric, five_segment or seven_segment");
-    return static_cast<int>(it - kModes.begin());
+    return static_cast<int>(it - sim::kDriveModes.begin());
   }
 
   std::vector<sim::Covariate> covariates_;

@@ -8,6 +8,7 @@
 // 250 moves x 25 columns are 250 MB.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -45,6 +46,10 @@ struct Covariate {
   std::string name;
   std::vector<double> values;  // Shape: (rows)
 };
+
+/// The kinds of space vector modulation that the column `mode` names.
+inline constexpr std::array<std::string_view, 3> kDriveModes = {"asymmetric", "five_segment",
+                                                                "seven_segment"};
 
 /// A column of words (`mode`): each row has an index into `words`, or -1 where the word is missing.
 struct WordColumn {

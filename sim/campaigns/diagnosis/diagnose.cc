@@ -25,6 +25,7 @@
 #include "sim/campaigns/diagnosis/plain_geometry.h"
 #include "sim/campaigns/diagnosis/polished.h"
 #include "sim/campaigns/diagnosis/remarks.h"
+#include "sim/campaigns/diagnosis/rotor_phases.h"
 #include "sim/campaigns/diagnosis/rotors.h"
 #include "sim/campaigns/diagnosis/screen.h"
 #include "sim/campaigns/diagnosis/shared_walk.h"
@@ -354,6 +355,8 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   }
   if (facts.closed.empty()) diagnosis.axes = ClassifyAxes(campaign, fit.model.units);
   diagnosis.x_before_um = fit.x_um, diagnosis.y_before_um = fit.y_um;
+  for (const std::size_t axis : {kTheta, kPhi})
+    facts.rotor_phase_deg[axis] = FindRotorPhases(fit, axis);
   Templates templates = ListLibrary(facts, options, &diagnosis.not_testable);
   SelectionRule rule{.family_wise = options.family_wise, .seed = options.seed};
   double share = 0.1;

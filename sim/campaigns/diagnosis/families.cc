@@ -383,10 +383,12 @@ void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<Cau
   for (const NotTestable& other : not_testable) {
     const Effect* effect = FindEffect(other.cause);
     if (effect == nullptr || !other.why.starts_with("column ")) continue;
-    for (CauseFound& cause : *causes)
-      if (std::ranges::count(effect->passes_for, cause.cause) != 0 &&
-          !IsCandidate(cause, other.cause) && std::ranges::count(cause.cannot_be, other.cause) == 0)
+    for (CauseFound& cause : *causes) {
+      const auto is_candidate = [&](std::string_view name) { return IsCandidate(cause, name); };
+      if (std::ranges::any_of(effect->passes_for, is_candidate) && !is_candidate(other.cause) &&
+          std::ranges::count(cause.cannot_be, other.cause) == 0)
         cause.candidates.push_back(other.cause);
+    }
   }
 }
 

@@ -215,35 +215,36 @@ std::vector<std::vector<std::size_t>> NeighboursOf(const Campaign& campaign, dou
   return neighbours;
 }
 
+void AddModes(const Campaign& campaign, CampaignFacts* facts) {
+  const auto words = std::ranges::find(campaign.word_columns, kMode, &WordColumn::name);
+  if (words == campaign.word_columns.end()) return;
+  std::vector<double> modes;
+  for (const int word : words->values) {
+    const auto known =
+        word < 0 ? std::end(kDriveModes)
+                 : std::ranges::find(kDriveModes, words->words[static_cast<std::size_t>(word)]);
+    modes.push_back(known == std::end(kDriveModes)
+                        ? std::numeric_limits<double>::quiet_NaN()
+                        : static_cast<double>(known - std::begin(kDriveModes)));
+  }
+  FilledColumn column = Fill(modes, campaign, facts->exposures);
+  if (column.missing_share <= kMissingShareMax)
+    facts->columns[std::string(kMode)] = std::move(column);
+}
+
 // The pull is the sum of sin(psi_u - psi_v) (pitch / distance)^3 over the neighbours, with psi the
 // motor's angle.
 void FindNeighbourPull(const Campaign& campaign, CampaignFacts* facts) {
   if (campaign.units.size() < 2) return;
-  const auto neighbours = NeighboursOf(campaign, 1.3 * facts->pitch_mm);
-  std::vector<double> pull[2] = {std::vector<double>(campaign.rows()),
-                                 std::vector<double>(campaign.rows())};
-  std::vector<std::size_t> row_of(facts->exposures.size());
-  for (std::size_t u = 0; u < campaign.units.size(); ++u)
-    for (const std::size_t v : neighbours[u]) {
-      std::fill(row_of.begin(), row_of.end(), SIZE_MAX);
-      for (std::size_t row = campaign.first_row[v]; row < campaign.first_row[v + 1]; ++row)
-        row_of[facts->exposures.of_row[row]] = row;
-      const CampaignUnit& a = campaign.units[u];
-      const CampaignUnit& b = campaign.units[v];
-      const double near =
-          facts->pitch_mm / std::hypot(a.base_x_mm - b.base_x_mm, a.base_y_mm - b.base_y_mm);
-      for (std::size_t row = campaign.first_row[u]; row < campaign.first_row[u + 1]; ++row) {
-        const std::size_t other = row_of[facts->exposures.of_row[row]];
-        if (other == SIZE_MAX) continue;
-        for (const std::size_t axis : {kTheta, kPhi})
-          pull[axis][row] +=
-              near * near * near *
-              std::sin(kRadiansPerDegree * (a.gear[axis] * campaign.cmd_deg[axis][row] -
-                                            b.gear[axis] * campaign.cmd_deg[axis][other]));
-      }
-    }
-  facts->columns[std::string(kNeighbourTheta)] = Fill(pull[kTheta], campaign, facts->exposures);
-  facts->columns[std::string(kNeighbourPhi)] = Fill(pull[kPhi], campaign, facts->exposures);
+  facts->pulling = NeighboursOf(campaign, 1.3 * facts->pitch_mm);
+  for (const auto& [axis, name] : {std::pair(kTheta, kNeighbourTheta), {kPhi, kNeighbourPhi}}) {
+    std::vector<double> pull(campaign.rows());
+    for (std::size_t u = 0; u < campaign.units.size(); ++u)
+      for (const std::size_t v : facts->pulling[u])
+        for (const PullingPair& pair : PullOf(*facts, u, v, axis))
+          pull[pair.row] += pair.nearness * std::sin(pair.angle_rad);
+    facts->columns[std::string(name)] = Fill(pull, campaign, facts->exposures);
+  }
 }
 
 void FindContacts(const Campaign& campaign, CampaignFacts* facts) {
@@ -331,6 +332,28 @@ void AddPixelColumns(CampaignFacts* facts) {
 
 }  // namespace
 
+std::vector<PullingPair> PullOf(const CampaignFacts& facts, std::size_t unit, std::size_t neighbour,
+                                std::size_t axis) {
+  const Campaign& campaign = *facts.campaign;
+  const CampaignUnit &a = campaign.units[unit], &b = campaign.units[neighbour];
+  const double near =
+      facts.pitch_mm / std::hypot(a.base_x_mm - b.base_x_mm, a.base_y_mm - b.base_y_mm);
+  std::vector<PullingPair> pairs;
+  std::size_t other = campaign.first_row[neighbour];
+  const std::size_t end = campaign.first_row[neighbour + 1];
+  const std::vector<std::int64_t>& move_id = campaign.move_id;  // ascends in each unit
+  for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+    while (other < end && move_id[other] < move_id[row]) ++other;
+    if (other == end) break;
+    if (move_id[other] != move_id[row]) continue;
+    pairs.push_back({row,
+                     kRadiansPerDegree * (a.gear[axis] * campaign.cmd_deg[axis][row] -
+                                          b.gear[axis] * campaign.cmd_deg[axis][other]),
+                     near * near * near});
+  }
+  return pairs;
+}
+
 CampaignFacts MakeFacts(const Campaign& campaign) {
   CampaignFacts facts;
   facts.campaign = &campaign;
@@ -339,6 +362,7 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
     FilledColumn column = Fill(covariate.values, campaign, facts.exposures);
     if (column.missing_share <= kMissingShareMax) facts.columns[covariate.name] = std::move(column);
   }
+  AddModes(campaign, &facts);
   AddUnitColumns(campaign, &facts);
   AddPixelColumns(&facts);
   FindPlate(campaign, &facts);

@@ -42,6 +42,7 @@ inline constexpr std::string_view kRailMotors = "motors in motion on the rail"; 
 inline constexpr std::string_view kSharedMotors = "motors behind shared harness";
 inline constexpr std::string_view kNeighbourTheta = "neighbours' theta motors";
 inline constexpr std::string_view kNeighbourPhi = "neighbours' phi motors";
+inline constexpr std::string_view kMode = "mode";  // indices of kDriveModes (campaign.h)
 // The column exists only where arms come near each other (arm_gap.h).
 inline constexpr std::string_view kArmGap = "gap to the next arm";
 inline constexpr std::string_view kArmGapSide = "side of the next arm";
@@ -55,6 +56,11 @@ struct CampaignFacts {
   // Shape: (rows), or empty where no row is: the loop was closed before the move (closed_loop.h).
   std::vector<char> closed;
   std::vector<double> step_deg[2];  // Shape: (rows): as commanded, wraps of whole turns undone
+  // Shape: (units): indices of the units that are near enough for their motors to pull.
+  std::vector<std::vector<std::size_t>> pulling;
+  // By unit_id, deg: where the rotors stand at motor angles of 0, as the pull of their neighbours
+  // shows it (diagnosis/rotor_phases.h). Empty where it is not known.
+  std::map<std::uint32_t, double> rotor_phase_deg[2];
   double radius_mm = 0;     // of the plate: farthest base from the frame's origin; at least 1
   double pitch_mm = 0;      // median distance to the nearest base; 0 with one unit
   std::size_t homings = 0;  // restarts that are not a unit's first row
@@ -62,6 +68,16 @@ struct CampaignFacts {
   [[nodiscard]] const FilledColumn* Find(std::string_view name) const;
   [[nodiscard]] bool Has(std::string_view name) const { return Find(name) != nullptr; }
 };
+
+/// The motors of two units near each other in one exposure.
+struct PullingPair {
+  std::size_t row = 0;   // of the unit
+  double angle_rad = 0;  // its motor's angle less the neighbour's, as commanded
+  double nearness = 0;   // (pitch / distance)^3
+};
+/// All moves of the unit that the neighbour was seen with.
+std::vector<PullingPair> PullOf(const CampaignFacts& facts, std::size_t unit, std::size_t neighbour,
+                                std::size_t axis);
 
 /// Pre: the campaign is valid and outlives the facts.
 CampaignFacts MakeFacts(const Campaign& campaign);
