@@ -17,7 +17,8 @@ Motions::Motions(const LocalSearchRequest& request)
       weight_(scene_.size()),
       order_(scene_.size()),
       count_(scene_.size(), 0),
-      answers_(scene_.size()) {
+      answers_(scene_.size()),
+      met_standing_(scene_.size()) {
   without_notice_.notice_s = 0;
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
     const std::size_t near = scene_.neighbours(i).size();
@@ -84,9 +85,8 @@ bool Motions::Meet(std::uint32_t unit, std::uint32_t slot) {
 
 double Motions::Cost(std::uint32_t unit, const Track& track, double limit) {
   // A unit that merely stands was not brought there by this plan.
-  for (const StandingThing& thing : scene_.standing(unit))
-    if (track.moves() && !PassesClearOf(scene_.arm(unit), track, thing.capsule, thing.need_mm))
-      return kNever;
+  if (track.moves() && !scene_.PassesClearOfStanding(unit, track, &met_standing_[unit]))
+    return kNever;
   double cost = 0;
   std::vector<std::uint32_t>& order = order_[unit];
   for (std::size_t k = 0; k < order.size(); ++k) {
@@ -148,9 +148,8 @@ void Motions::MoveInto(LocalSearchResult* result) {
 bool MeetsForGood(std::uint32_t unit, Motions* motions) {
   const Scene& scene = motions->scene();
   const Track& own = motions->track(unit);
-  for (const StandingThing& thing : scene.standing(unit))
-    if (own.moves() && !PassesClearOf(scene.arm(unit), own, thing.capsule, thing.need_mm))
-      return true;
+  std::uint32_t met = 0;
+  if (own.moves() && !scene.PassesClearOfStanding(unit, own, &met)) return true;
   for (std::uint32_t slot = 0; slot < scene.neighbours(unit).size(); ++slot)
     if (motions->request().movable[scene.neighbours(unit)[slot].unit] == 0 &&
         motions->Meet(unit, slot))

@@ -108,6 +108,7 @@ class Motions {
   };
   std::vector<std::uint32_t> count_;          // by unit: motions that it has had
   std::vector<std::vector<Answer>> answers_;  // by unit and slot
+  std::vector<std::uint32_t> met_standing_;   // by unit: the standing thing that was met last
   bool in_trial_ = false;
   std::vector<Before> before_;  // in the order in which units were replaced in the trial
   std::vector<std::vector<std::uint8_t>> unnoticed_before_;

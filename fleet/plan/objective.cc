@@ -120,8 +120,8 @@ double Improver::Cost(std::uint32_t unit, const Draws& draws) {
 
 bool Improver::IsClear(std::uint32_t unit, const Track& track) const {
   const ArmGeometry& arm = scene_.arm(unit);
-  for (const StandingThing& thing : scene_.standing(unit))
-    if (!PassesClearOf(arm, track, thing.capsule, thing.need_mm)) return false;
+  std::uint32_t met = 0;
+  if (!scene_.PassesClearOfStanding(unit, track, &met)) return false;
   for (const NeighbourNeed& near : scene_.neighbours(unit)) {
     if (!scene_.is_place(near.unit)) continue;
     const IndexPair pair = std::minmax(unit, near.unit);

@@ -77,7 +77,8 @@ void PathSearch::SetUp(const Question& question) {
   }
   nodes_.assign(static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1]), Node{});
   open_.clear();
-  last_touched_ = 0;
+  BundleUp(q_.blockers, &bundles_);
+  last_nearest_ = 0;
 }
 
 Pose PathSearch::PoseOf(std::int32_t node) const {
@@ -94,11 +95,18 @@ double PathSearch::ExactClearance(std::int32_t index) {
     return DistanceMm(line, b.capsule.line) - b.capsule.radius_mm - b.need_mm;
   };
   double least = static_cast<double>(std::numeric_limits<float>::max());
-  if (last_touched_ < q_.blockers.size()) least = clearance(q_.blockers[last_touched_]);
-  for (std::size_t k = 0; k < q_.blockers.size() && least > 0; ++k) {
-    const double here = clearance(q_.blockers[k]);
-    if (here <= 0) last_touched_ = k;  // only "not clear" matters then
-    least = std::min(least, here);
+  if (last_nearest_ < q_.blockers.size()) least = clearance(q_.blockers[last_nearest_]);
+  for (const Bundle& bundle : bundles_) {
+    if (bundle.has_several() &&
+        DistanceMm(line, bundle.around.line) - bundle.around.radius_mm >= least)
+      continue;
+    // Only "not clear" matters where the least is not above 0.
+    for (std::size_t k = bundle.begin; k < bundle.end && least > 0; ++k) {
+      const double here = clearance(q_.blockers[k]);
+      if (here >= least) continue;
+      least = here;
+      last_nearest_ = k;
+    }
   }
   // Rounded down: a clearance must never be overstated.
   node.clearance = std::nextafter(static_cast<float>(least), -1e30f);

@@ -13,6 +13,7 @@
 
 #include "fleet/geometry/arm.h"
 #include "fleet/plan/abandoned.h"
+#include "fleet/plan/bundles.h"
 
 namespace focalfleet {
 
@@ -104,8 +105,9 @@ class PathSearch {
   std::int32_t low_[kAxisCount]{};  // grid index of the lowest pose within
   std::int32_t count_[kAxisCount]{};
   std::vector<Node> nodes_;
-  /// the blocker that was touched last; the next node is likely to touch the same one
-  std::size_t last_touched_ = 0;
+  std::vector<Bundle> bundles_;  // of the blockers
+  /// the blocker that was nearest last; it is likely to be near the next node, too
+  std::size_t last_nearest_ = 0;
   std::vector<Open> open_;
   std::vector<Pose> reached_;
   std::vector<std::int32_t> reached_nodes_;

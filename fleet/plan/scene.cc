@@ -179,6 +179,29 @@ void Scene::FindStanding(std::span<const UnitKnowledge> start) {
     }
     standing_begin_.push_back(static_cast<std::uint32_t>(standing_.size()));
   }
+  bundles_.resize(size());
+  for (std::uint32_t i = 0; i < size(); ++i) BundleUp(standing(i), &bundles_[i]);
+}
+
+bool Scene::PassesClearOfStanding(std::uint32_t unit, const Track& track,
+                                  std::uint32_t* met) const {
+  constexpr int kFewDistances = 16;  // a bundle that is not soon found clear is opened
+  const ArmGeometry& arm = arms_[unit];
+  const std::span<const StandingThing> things = standing(unit);
+  const auto clear_of = [&](std::uint32_t k) {
+    return PassesClearOf(arm, track, things[k].capsule, things[k].need_mm);
+  };
+  if (*met < things.size() && !clear_of(*met)) return false;
+  for (const Bundle& bundle : bundles_[unit]) {
+    if (bundle.has_several() && PassesClearOf(arm, track, bundle.around, 0, kFewDistances))
+      continue;
+    for (std::uint32_t k = bundle.begin; k < bundle.end; ++k) {
+      if (clear_of(k)) continue;
+      *met = k;
+      return false;
+    }
+  }
+  return true;
 }
 
 void Scene::AllowFor(std::span<const Pose> poses) {

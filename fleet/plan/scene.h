@@ -19,6 +19,8 @@
 #include "fleet/geometry/arm.h"
 #include "fleet/knowledge.h"
 #include "fleet/layout.h"
+#include "fleet/plan/bundles.h"
+#include "fleet/plan/track.h"
 
 namespace focalfleet {
 
@@ -77,6 +79,11 @@ class Scene {
   }
   [[nodiscard]] bool is_place(std::uint32_t unit) const { return is_place_[unit] != 0; }
 
+  /// The motion passes clear of all standing things of the unit. `met` is looked at first, and is
+  /// the one that is met where there is one: the next motion is likely to meet the same.
+  [[nodiscard]] bool PassesClearOfStanding(std::uint32_t unit, const Track& track,
+                                           std::uint32_t* met) const;
+
   /// Half-widths and clearance of a pair, exactly as the rule says.
   [[nodiscard]] double FullNeed(std::uint32_t a, std::uint32_t b) const {
     return arms_[a].half_width_mm() + arms_[b].half_width_mm() + layout_->clearance_mm();
@@ -103,6 +110,7 @@ class Scene {
   std::vector<NeighbourNeed> needs_;
   std::vector<std::uint32_t> standing_begin_;
   std::vector<StandingThing> standing_;
+  std::vector<std::vector<Bundle>> bundles_;  // of the standing things of each unit
 };
 
 /// Capsules that cover the arm in every pose of the box, each at most `slack_mm` too wide where 400

@@ -38,6 +38,7 @@ bool TimeSearch::SetUp() {
   steps_max_ = static_cast<std::int32_t>((q_.end_s - q_.begin_s) / step_s_);
   nodes_.clear();
   open_.clear();
+  BundleUp(q_.standing, &bundles_);
   const auto poses = static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1]);
   safe_.resize(std::max(safe_.size(), poses));
   known_.assign(poses, 0);
@@ -82,10 +83,15 @@ bool TimeSearch::StepClear(const Leg& leg) const {
                         neighbour.tolerance))
       return false;
   }
-  for (const Blocker& blocker : q_.standing) {
-    const double far = blocker.need_mm + travel + blocker.capsule.radius_mm;
-    if (SquaredDistance(blocker.capsule.line, middle) > far * far) continue;
-    if (!LegPassesClearOf(*q_.arm, leg, blocker.capsule, blocker.need_mm)) return false;
+  for (const Bundle& bundle : bundles_) {
+    const double all_far = travel + bundle.around.radius_mm;
+    if (bundle.has_several() && SquaredDistance(bundle.around.line, middle) > all_far * all_far)
+      continue;
+    for (const Blocker& blocker : OfBundle(bundle)) {
+      const double far = blocker.need_mm + travel + blocker.capsule.radius_mm;
+      if (SquaredDistance(blocker.capsule.line, middle) > far * far) continue;
+      if (!LegPassesClearOf(*q_.arm, leg, blocker.capsule, blocker.need_mm)) return false;
+    }
   }
   return true;
 }
@@ -105,9 +111,14 @@ std::vector<TimeSearch::Interval>& TimeSearch::SafeAt(std::int32_t pose) {
   safe.clear();
   const Pose at = PoseOf(pose);
   const SegmentFp line = q_.arm->At(at);
-  for (const Blocker& blocker : q_.standing) {
-    const double need = blocker.need_mm + blocker.capsule.radius_mm;
-    if (SquaredDistance(line, blocker.capsule.line) <= need * need) return safe;
+  for (const Bundle& bundle : bundles_) {
+    const double all_need = bundle.around.radius_mm;
+    if (bundle.has_several() && SquaredDistance(line, bundle.around.line) > all_need * all_need)
+      continue;
+    for (const Blocker& blocker : OfBundle(bundle)) {
+      const double need = blocker.need_mm + blocker.capsule.radius_mm;
+      if (SquaredDistance(line, blocker.capsule.line) <= need * need) return safe;
+    }
   }
   const Bounds here{std::min(line.a.x_mm, line.b.x_mm), std::max(line.a.x_mm, line.b.x_mm),
                     std::min(line.a.y_mm, line.b.y_mm), std::max(line.a.y_mm, line.b.y_mm)};

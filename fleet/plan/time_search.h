@@ -72,6 +72,9 @@ class TimeSearch {
   [[nodiscard]] Pose PoseOf(std::int32_t pose) const;
   [[nodiscard]] Leg LegOf(const Pose& from, const Pose& to, std::int32_t step) const;
   [[nodiscard]] bool StepClear(const Leg& leg) const;
+  [[nodiscard]] std::span<const Blocker> OfBundle(const Bundle& bundle) const {
+    return q_.standing.subspan(bundle.begin, bundle.end - bundle.begin);
+  }
   [[nodiscard]] std::int32_t StepsLeft(const Pose& pose) const;
   std::vector<Interval>& SafeAt(std::int32_t pose);
   void Expand(std::int32_t node);
@@ -93,6 +96,7 @@ class TimeSearch {
   std::vector<std::vector<Interval>> safe_;
   std::vector<std::uint8_t> known_;
   std::vector<std::uint8_t> blocked_;  // scratch: by step
+  std::vector<Bundle> bundles_;        // of what stands
 };
 
 }  // namespace focalfleet

@@ -46,14 +46,25 @@ std::vector<Candidate> UnitWays::ViaCell(std::uint32_t unit, std::uint32_t other
   cell.high[1] = std::min(cell.high[1], scene.cell(unit).high);
   if (cell.low[1] > cell.high[1]) return ways;
   const Way in = AmongStanding(unit, q_.from[unit], cell, other, q_.from);
-  const Way out = AmongStanding(unit, q_.to[unit], cell, other, q_.to);
+  const Way& out = AmongStanding(unit, q_.to[unit], cell, other, q_.to);
   AppendVia(QuestionFor(unit, within_s), in, out, &ways);
   std::erase_if(ways, [&](const Candidate& way) { return way.end_s > within_s; });
   return ways;
 }
 
-Way UnitWays::AmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
-                            std::uint32_t other, std::span<const Pose> poses) {
+const Way& UnitWays::AmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
+                                   std::uint32_t other, std::span<const Pose> poses) {
+  std::vector<KnownWay>& ways = known_ways_[unit];
+  const auto known = std::ranges::find_if(ways, [&](const KnownWay& way) {
+    return way.other == other && way.poses == poses.data() && way.from == from && way.goal == goal;
+  });
+  if (known != ways.end()) return known->way;
+  Way way = FindAmongStanding(unit, from, goal, other, poses);
+  return ways.emplace_back(other, poses.data(), from, goal, std::move(way)).way;
+}
+
+Way UnitWays::FindAmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
+                                std::uint32_t other, std::span<const Pose> poses) {
   const Scene& scene = motions_.scene();
   blockers_.clear();
   for (const NeighbourNeed& near : scene.neighbours(unit)) {

@@ -19,7 +19,11 @@ namespace focalfleet {
 class UnitWays {
  public:
   /// Lifetime: both outlive this.
-  UnitWays(Motions* motions, Rng* rng) : motions_(*motions), q_(motions->request()), rng_(*rng) {}
+  UnitWays(Motions* motions, Rng* rng)
+      : motions_(*motions),
+        q_(motions->request()),
+        rng_(*rng),
+        known_ways_(motions->scene().size()) {}
 
   /// The question for candidates from the unit's start to its target.
   [[nodiscard]] CandidateQuestion QuestionFor(std::uint32_t unit, double within_s) const;
@@ -31,8 +35,9 @@ class UnitWays {
                                                double within_s);
   /// A way for `unit` among what never moves, and `other` where `poses` has it. Empty: there is
   /// none. Shape: `poses` (n).
-  [[nodiscard]] Way AmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
-                                  std::uint32_t other, std::span<const Pose> poses);
+  /// A question that was asked before costs nothing. Lifetime: until the next call.
+  [[nodiscard]] const Way& AmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
+                                         std::uint32_t other, std::span<const Pose> poses);
 
   /// The least cost of the candidates from `first` on that end within `within_s`, and which one has
   /// it. Equal costs are drawn by lot. Motions::kNever: none is possible.
@@ -46,13 +51,25 @@ class UnitWays {
   bool TakeBySearchInTime(std::uint32_t unit, double end_s, int attempts);
 
  private:
+  [[nodiscard]] Way FindAmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
+                                      std::uint32_t other, std::span<const Pose> poses);
+
+  /// A way among standing things. Nothing of the question changes during a search.
+  struct KnownWay {
+    std::uint32_t other = 0;
+    const Pose* poses = nullptr;
+    Pose from{};
+    PoseBox goal;
+    Way way;
+  };
   Motions& motions_;
   const LocalSearchRequest& q_;
   Rng& rng_;
   TimeSearch time_search_;
   PathSearch path_search_;
-  std::vector<MovingNeighbour> moving_;  // scratch
-  std::vector<Blocker> blockers_;        // scratch
+  std::vector<std::vector<KnownWay>> known_ways_;  // by unit
+  std::vector<MovingNeighbour> moving_;            // scratch
+  std::vector<Blocker> blockers_;                  // scratch
 };
 
 }  // namespace focalfleet
