@@ -350,7 +350,11 @@ void LateMoves::SayStart(Move* late) {
   }
   const PositionerIndex i = late->unit;
   const DurationNs left = round_.BeganOf(i) - fleet_.now();
-  const auto ticks = static_cast<std::uint32_t>(std::max<std::int64_t>(left.ns, 0) / kTick.ns);
+  if (left <= DurationNs{0}) {  // the host was held up: a later begin would not be the planned one
+    late->starts_said = kStartsAsLate;
+    return;
+  }
+  const auto ticks = static_cast<std::uint32_t>(left.ns / kTick.ns);
   fleet_.requests.SendNow(fleet_.units[i].bus, focalfleet::Start{round_.MoveOf(i), ticks},
                           kBroadcastNode);
   ++late->starts_said;

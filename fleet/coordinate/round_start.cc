@@ -46,12 +46,20 @@ HostInstant RoundStart::Begin(HostInstant at) {
 
 HostInstant RoundStart::Repeat() {
   if (fleet_.now() < repeat_at_) return kNever;
+  // A host that was held up repeats nothing: whoever missed the signal would begin out of step with
+  // all others.
+  if (Left() <= DurationNs{0}) return repeat_at_ = kNever;
   return Say();
 }
 
+/// From now to the instant that start signals name.
+DurationNs RoundStart::Left() const {
+  const DurationNs left = round_.started - fleet_.now();
+  return fleet_.config.sync_line ? left + fleet_.config.sync_lead : left;
+}
+
 HostInstant RoundStart::Say() {
-  DurationNs left = round_.started - fleet_.now();
-  if (fleet_.config.sync_line) left = left + fleet_.config.sync_lead;
+  const DurationNs left = Left();
   const auto ticks = static_cast<std::uint32_t>(std::max<std::int64_t>(left.ns, 0) / kTick.ns);
   std::vector<bool> said_on(fleet_.units.buses.size());
   for (const UnitPlan& move : round_.plan.moves) {

@@ -33,6 +33,7 @@ class RoundStart {
 
  private:
   HostInstant Say();
+  [[nodiscard]] DurationNs Left() const;
 
   const Coordination fleet_;
   Round& round_;
