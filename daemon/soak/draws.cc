@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "protocol/base/rng.h"
@@ -43,6 +44,12 @@ Draws DrawSeed(std::uint64_t seed, const DrawLimits& limits) {
     draws.units = *limits.units;
     if (draws.units > 200) draws.units_per_bus = 100;
   }
+  // A late move of one unit is planned without a limit.
+  Rng power = Rng::Stream(seed, "soak power");
+  if (power.Below(4) == 0 && !draws.is(FaultSite::kOperatorRetarget)) {
+    const double motors = 2 * std::min<double>(draws.units, 2 * draws.units_per_bus);
+    draws.rail_motors = 0.5 + std::floor(motors * power.Uniform(0.4, 0.8));
+  }
   return draws;
 }
 
@@ -53,7 +60,8 @@ std::string Describe(const Draws& draws) {
       draws.seed, draws.units, draws.units_per_bus, 1e-9 * static_cast<double>(draws.safety.ns),
       1e-6 * static_cast<double>(draws.commit.ns), 1e-6 * static_cast<double>(draws.plan.ns),
       1e-6 * static_cast<double>(draws.turn.ns), 1e-9 * static_cast<double>(draws.idle.ns),
-      draws.camera ? ", camera" : "");
+      (draws.camera ? ", camera" : "") +
+          (draws.rail_motors > 0 ? fmt::format(", {} motors a rail", draws.rail_motors) : ""));
   bool any = false;
   for (std::size_t site = 0; site < kFaultSites; ++site) {
     if (!draws.armed[site]) continue;

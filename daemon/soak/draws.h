@@ -23,6 +23,7 @@ struct Draws {
   DurationNs idle = Seconds(4);         // mean time between two requests of operators
   bool camera = false;
   bool real_spread = false;
+  double rail_motors = 0;  // as many motors of a rail may turn at a time in a plan; 0: all
   std::array<bool, kFaultSites> armed{};
   /// Mean time between two faults of a site that goes by time.
   std::array<DurationNs, kFaultSites> period{};

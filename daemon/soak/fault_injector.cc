@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "daemon/soak/virtual_time.h"
 #include "protocol/wire/codec.h"
 
 namespace focalfleet::soak {
@@ -18,7 +19,7 @@ bool IsByOccasion(FaultSite site) {
          site == kStoreReaderFails;
 }
 bool IsOfOperators(FaultSite site) { return site >= kOperatorBusy && site <= kOperatorGone; }
-bool IsOfCamera(FaultSite site) { return site >= kCameraDead; }
+bool IsOfCamera(FaultSite site) { return site >= kCameraDead && site <= kCameraOtherField; }
 
 /// Limits of how long a fault lasts.
 constexpr double kLastsMinS = 0.3, kLastsMaxS = 15;
@@ -71,6 +72,17 @@ bool FaultInjector::Happens(FaultSite site, double more) {
   return true;
 }
 
+void FaultInjector::Sent(BusId bus, const CanFrame& frame) {
+  if (healed_ || !is_on(kOldAnswers)) return;
+  const auto buses = parts_.plant->layout().buses();
+  const auto index =
+      static_cast<std::size_t>(std::lower_bound(buses.begin(), buses.end(), bus) - buses.begin());
+  const auto old = parts_.plant->AnsweredBefore(index, frame);
+  if (!old) return;
+  Count(kOldAnswers);
+  parts_.plant->heard(index)->push_back({bus, HostInstant{ReadVirtualNs()}, *old});
+}
+
 void FaultInjector::Until(HostInstant at, std::function<void()> undo) {
   ends_.push({at, ends_number_++, std::move(undo)});
 }
@@ -105,7 +117,8 @@ void FaultInjector::Begin(FaultSite site) {
     case kDiskWriteError:
     case kDiskSyncError:
     case kDiskReadError:
-      return lasting();  // counted where an operation fails
+    case kOldAnswers:
+      return lasting();  // counted where an operation fails, or an old answer is heard
     case kDiskDropsPages:
       parts_.disk->drops_failed_syncs = true;
       on_[Index(kDiskDropsPages)] = true;

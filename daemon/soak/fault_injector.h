@@ -37,6 +37,8 @@ class FaultInjector {
   /// Whether a fault that goes by occasions happens now; it is counted then. `more` times likelier
   /// where it is most dangerous.
   bool Happens(FaultSite site, double more = 1);
+  /// The host gives a frame to a bus; the old answer to it may be heard first.
+  void Sent(BusId bus, const CanFrame& frame);
   /// No fault begins any more, and all that lasts has ended.
   void Heal(HostInstant now);
 

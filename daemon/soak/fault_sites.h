@@ -93,6 +93,8 @@ enum class FaultSite : std::uint8_t {
   kCameraDoubled,
   kCameraTurned,
   kCameraOtherField,
+  // An answer of a unit from long before comes once more, just before that to a new question.
+  kOldAnswers,
   kCount
 };
 inline constexpr std::size_t kFaultSites = static_cast<std::size_t>(FaultSite::kCount);
@@ -171,7 +173,8 @@ inline constexpr std::array<const char*, kFaultSites> kFaultSiteNames{"kill_gath
                                                                       "camera_late",
                                                                       "camera_doubled",
                                                                       "camera_turned",
-                                                                      "camera_other_field"};
+                                                                      "camera_other_field",
+                                                                      "old_answers"};
 
 constexpr std::size_t Index(FaultSite site) { return static_cast<std::size_t>(site); }
 constexpr const char* Name(FaultSite site) { return kFaultSiteNames[Index(site)]; }

@@ -4,16 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <variant>
 
+#include "daemon/soak/true_arms.h"
 #include "daemon/soak/virtual_time.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet::soak {
 namespace {
-
-using Point = std::complex<double>;
 
 constexpr std::size_t kBrokenMax = 20;
 /// A rotor lags behind its field by less than this at rest. Units: vectors.
@@ -30,25 +28,6 @@ constexpr DurationNs kContactAfter = Seconds(60);
 constexpr std::size_t kReportedMax = 64;
 /// A row may be so much older than its commit, where the disk fails.
 constexpr DurationNs kRowHeld = Seconds(30);
-constexpr double kDegree = 3.14159265358979323846 / 180;
-
-double Cross(Point a, Point b) { return a.real() * b.imag() - a.imag() * b.real(); }
-double Dot(Point a, Point b) { return a.real() * b.real() + a.imag() * b.imag(); }
-
-double FromSegment(Point p, Point a, Point b) {
-  const double length = std::norm(b - a);
-  const double t = length > 0 ? std::clamp(Dot(p - a, b - a) / length, 0.0, 1.0) : 0.0;
-  return std::abs(p - a - t * (b - a));
-}
-
-/// The distance of two segments: 0 where they cross, else that of an end.
-double BetweenSegments(Point a, Point b, Point c, Point d) {
-  const double side_c = Cross(b - a, c - a), side_d = Cross(b - a, d - a);
-  const double side_a = Cross(d - c, a - c), side_b = Cross(d - c, b - c);
-  if (side_c * side_d < 0 && side_a * side_b < 0) return 0;
-  return std::min(
-      {FromSegment(a, c, d), FromSegment(b, c, d), FromSegment(c, a, b), FromSegment(d, a, b)});
-}
 
 StoredPlace PlaceOf(const VectorRow& vector) {
   StoredPlace place;
@@ -64,12 +43,15 @@ bool Moves(const sim::UnitTruth& truth) {
 
 }  // namespace
 
-Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles, bool camera)
+Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles,
+             const Draws& draws)
     : plant_(plant),
       disk_(disk),
       troubles_(troubles),
-      slack_vectors_(camera ? kSeenVectors : kLagVectors),
-      seen_(plant->layout().size()) {
+      slack_vectors_(draws.camera ? kSeenVectors : kLagVectors),
+      seen_(plant->layout().size()),
+      motion_(plant, troubles, draws.rail_motors * MotorAsMeasured_W(),
+              [this](const std::string& rule, const std::string& what) { Broken(rule, what); }) {
   const auto units = plant->layout().units();
   near_.resize(units.size());
   for (std::size_t i = 0; i < units.size(); ++i)
@@ -194,7 +176,8 @@ const StoredPicture* Judge::Durable() {
   return durable_ ? &*durable_ : nullptr;
 }
 
-void Judge::Sends(BusId, const CanFrame& frame) {
+void Judge::Sends(BusId bus, const CanFrame& frame) {
+  motion_.Sends(bus, frame, HostInstant{ReadVirtualNs()});
   constexpr std::uint32_t kStart = 1, kHome = 8;
   const std::uint32_t function = frame.id >> 20 & 0x1f;
   if (function != kStart && function != kHome) return;
@@ -254,6 +237,7 @@ void Judge::Look(HostInstant now) {
     LookAtPlace(row, truths.back());
     LookAtStop(row, truths.back());
   }
+  motion_.Look(now, truths, near_);
   LookForContact(truths);
 }
 
@@ -340,19 +324,12 @@ void Judge::LookAtStop(std::size_t row, const sim::UnitTruth& truth) {
 
 void Judge::LookForContact(std::span<const sim::UnitTruth> truths) {
   const auto units = plant_->layout().units();
-  const auto arm = [&](std::size_t row) {
-    const double theta = (truths[row].angle_deg[0] + units[row].axis[0].zero_deg) * kDegree;
-    const double phi = (truths[row].angle_deg[1] + units[row].axis[1].zero_deg) * kDegree;
-    const Point base{units[row].base_fp.x_mm, units[row].base_fp.y_mm};
-    const Point elbow = base + std::polar(units[row].axis[0].arm_mm, theta);
-    return std::pair(elbow, elbow + std::polar(units[row].axis[1].arm_mm, theta + phi));
-  };
-  std::vector<std::pair<Point, Point>> arms;
-  for (std::size_t row = 0; row < units.size(); ++row) arms.push_back(arm(row));
+  std::vector<TrueArm> arms;
+  for (std::size_t row = 0; row < units.size(); ++row)
+    arms.push_back(ArmOf(units[row], truths[row].angle_deg));
   for (std::size_t i = 0; i < units.size(); ++i)
     for (const std::size_t j : near_[i]) {
-      const double apart =
-          BetweenSegments(arms[i].first, arms[i].second, arms[j].first, arms[j].second);
+      const double apart = Between(arms[i], arms[j]);
       const bool touch = apart < units[i].arm_half_width_mm + units[j].arm_half_width_mm;
       if (!touch) {
         touching_.erase({i, j});

@@ -14,6 +14,8 @@
 //   stop       Within a bound after a stop was ordered, no reachable unit moves.
 //   twice      No move is begun twice.
 //   bound      Queues stay within their bounds.
+//
+// Motion has a judge of its own (motion_judge.h): starts of one move apart, followers, power.
 #pragma once
 
 #include <array>
@@ -28,6 +30,8 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/soak/draws.h"
+#include "daemon/soak/motion_judge.h"
 #include "daemon/soak/plant.h"
 #include "daemon/soak/stored_picture.h"
 #include "daemon/soak/troubles.h"
@@ -40,7 +44,9 @@ namespace focalfleet::soak {
 class Judge {
  public:
   /// With a camera, places are only as exact as it sees them.
-  Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles, bool camera);
+  Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles, const Draws& draws);
+  Judge(const Judge&) = delete;
+  Judge& operator=(const Judge&) = delete;
 
   // ---- what it sees
 
@@ -100,6 +106,7 @@ class Judge {
   std::set<Move> allowed_;                                     // by a durable intent
   std::set<Move> blind_;  // whose intent was acknowledged while the unit's place was not exact
   std::vector<Seen> seen_;
+  MotionJudge motion_;
   std::vector<std::vector<std::size_t>> near_;
   std::set<std::pair<std::size_t, std::size_t>> touching_;
   bool risk_ = false;

@@ -16,7 +16,10 @@ namespace {
 constexpr const char* kStorePath = "store.sqlite";
 /// Looks of a search after which it counts as one without end. A plan takes one to two looks a
 /// unit.
-int PlanLooksMax(std::size_t units) { return units <= 100 ? 100 : static_cast<int>(units) * 4; }
+int PlanLooksMax(std::size_t units, bool limited) {
+  const int most = units <= 100 ? 100 : static_cast<int>(units) * 4;
+  return limited ? 10 * most : most;  // units look for a start again and again
+}
 
 StoreOptions OptionsOf(const MemoryDisk& disk) {
   return {.busy_wait = std::chrono::milliseconds(0), .vfs = disk.name(), .vfs_has_files = true};
@@ -110,8 +113,10 @@ void Life::MakeQueues() {
                   return PlanFailed(work.job, {ErrorCode::kUnavailable, "the planner failed"});
                 // A search that finds no end is given up after so many looks, not after a time.
                 int looks = 0;
-                const int most = PlanLooksMax(layout->size());
-                return RunPlanJob(work.job, *layout, work.drives,
+                const int most = PlanLooksMax(layout->size(), around_.plan_limits.any());
+                PlanJob job = work.job;
+                job.options.power = around_.plan_limits;
+                return RunPlanJob(job, *layout, work.drives,
                                   [&looks, most] { return ++looks > most; });
               },
           .takes = around_.plan_takes,

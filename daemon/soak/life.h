@@ -34,6 +34,7 @@ struct Surroundings {
   std::function<DurationNs()> commit_takes;
   std::function<DurationNs()> plan_takes;
   std::function<bool()> planner_fails;
+  PowerLimits plan_limits;
   std::function<bool()> planner_has_room;
   std::function<bool()> reader_fails;
   std::function<bool()> publisher_has_room;

@@ -39,7 +39,7 @@ Night::Night(const Draws& draws, const NightOptions& options)
   troubles_.units.assign(units, Troubles::kLongAgo);
   troubles_.jumps.resize(units);
   troubles_.counts_lost.assign(units, Troubles::kLongAgo);
-  judge_ = std::make_unique<Judge>(plant_.get(), disk_.get(), &troubles_, draws_.camera);
+  judge_ = std::make_unique<Judge>(plant_.get(), disk_.get(), &troubles_, draws_);
   faults_ = std::make_unique<FaultInjector>(
       FaultInjector::Parts{.draws = &draws_,
                            .plant = plant_.get(),
@@ -89,6 +89,7 @@ Surroundings Night::Around() {
     return draws_.plan;
   };
   around.planner_fails = [this] { return faults_->Happens(kPlannerFails, 50); };
+  around.plan_limits = {.rail_W = draws_.rail_motors * MotorAsMeasured_W()};
   around.planner_has_room = [this] { return !faults_->Happens(kPlannerFull, 50); };
   around.reader_fails = [this] { return faults_->Happens(kStoreReaderFails, 20); };
   around.publisher_has_room = [this] { return !faults_->Happens(kReaderBehind, 20); };
@@ -143,6 +144,7 @@ void Night::Committed(std::span<const Row> rows, bool done) {
 void Night::Sends(BusId bus, const CanFrame& frame) {
   if (faults_->Happens(kKillBetweenFrames, 0.3)) throw Killed{kKillBetweenFrames};
   judge_->Sends(bus, frame);
+  faults_->Sent(bus, frame);
   ++result_.frames;
   const auto mix = [this](std::uint64_t word) { digest_ = (digest_ ^ word) * 0x100000001b3u; };
   mix(bus.value);

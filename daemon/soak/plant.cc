@@ -10,6 +10,14 @@
 #include "protocol/base/check.h"
 
 namespace focalfleet::soak {
+namespace {
+
+constexpr std::uint32_t kSequenceBits = 0xffu << 3;
+constexpr int kNodeShift = 11;
+/// Far fewer than sequence numbers, of which no old one may be that of a new question.
+constexpr std::size_t kAnswersOfUnit = 60;
+
+}  // namespace
 
 Plant::Plant(const Draws& draws) {
   HexPlate plate = MakeHexPlate({.count = draws.units,
@@ -32,6 +40,7 @@ Plant::Plant(const Draws& draws) {
   config.start = HostInstant{ReadVirtualNs()};
   FOCALFLEET_CHECK(sim::World::Validate(config).has_value());
   world_ = std::make_unique<sim::World>(std::move(config));
+  remembers_ = draws.is(FaultSite::kOldAnswers);
   heard_.resize(layout_->buses().size());
 }
 
@@ -42,7 +51,31 @@ void Plant::Advance(HostInstant now) {
   for (const ReceivedFrame& frame : delivered_) {
     const auto at = std::lower_bound(buses.begin(), buses.end(), frame.bus) - buses.begin();
     heard_[static_cast<std::size_t>(at)].push_back(frame);
+    Remember(static_cast<std::size_t>(at), frame.frame);
   }
+}
+
+void Plant::Remember(std::size_t bus, const CanFrame& frame) {
+  const bool asked = (frame.id & kSequenceBits) != 0;
+  if (!remembers_ || !asked) return;
+  std::deque<CanFrame>& answers = answers_[{bus, frame.id >> kNodeShift & 0xff}];
+  answers.push_back(frame);
+  if (answers.size() > kAnswersOfUnit) answers.pop_front();
+}
+
+std::optional<CanFrame> Plant::AnsweredBefore(std::size_t bus, const CanFrame& question) const {
+  const auto unit = answers_.find({bus, question.id >> kNodeShift & 0xff});
+  if (unit == answers_.end()) return std::nullopt;
+  // Vectors and parameters have the axis as their detail, in question and answer.
+  constexpr std::uint32_t kFunction = 0x3fu << 20, kAxis = 7u, kVector = 11, kParameter = 14;
+  const std::uint32_t function = question.id >> 20 & 0x3f;
+  const std::uint32_t what =
+      function == kVector || function >= kParameter ? kFunction | kAxis : kFunction;
+  for (auto answer = unit->second.rbegin(); answer != unit->second.rend(); ++answer) {
+    const std::uint32_t apart = answer->id ^ question.id;
+    if ((apart & what) == 0 && (apart & kSequenceBits) != 0) return *answer;
+  }
+  return std::nullopt;
 }
 
 void Plant::DropHeard() {

@@ -3,8 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
+#include <map>
 #include <memory>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "daemon/ports/pollable_port.h"
@@ -33,8 +37,14 @@ class Plant {
   [[nodiscard]] bool hears() const;
   /// Frames of all buses since the last call, in order.
   std::vector<sim::WireFrame> TakeWire() { return std::exchange(wire_, {}); }
+  /// The newest answer of this unit to a question of the same kind, under another
+  /// sequence number. None: there is none among its last ones.
+  [[nodiscard]] std::optional<CanFrame> AnsweredBefore(std::size_t bus,
+                                                       const CanFrame& question) const;
 
  private:
+  void Remember(std::size_t bus, const CanFrame& frame);
+
   std::unique_ptr<Layout> layout_;
   std::vector<UnitDrive> drives_;
   std::vector<Fiducial> fiducials_;
@@ -42,6 +52,8 @@ class Plant {
   std::vector<std::vector<ReceivedFrame>> heard_;  // Shape: as the layout's buses
   std::vector<ReceivedFrame> delivered_;
   std::vector<sim::WireFrame> wire_;
+  bool remembers_ = false;
+  std::map<std::pair<std::size_t, std::uint32_t>, std::deque<CanFrame>> answers_;  // by bus, node
 };
 
 /// A host's port to one bus of the plant.

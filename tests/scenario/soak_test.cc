@@ -21,14 +21,23 @@ NightResult RunSeed(std::uint64_t seed, std::uint32_t units = 0) {
   return Night(DrawSeed(seed, limits), {.replay = true}).Run();
 }
 
-void ExpectKept(std::uint64_t seed, std::uint32_t units = 0) {
-  const NightResult result = RunSeed(seed, units);
+void ExpectKept(std::uint64_t seed, const NightResult& result) {
   for (const std::string& broken : result.broken) ADD_FAILURE() << "seed " << seed << " " << broken;
   EXPECT_GT(result.commits, 10u) << "seed " << seed << " stored nothing";
 }
 
+/// A night as it was when the seed was found: later kinds of draws would make it another one.
+void ExpectKept(std::uint64_t seed, std::uint32_t units = 0) {
+  DrawLimits limits;
+  if (units > 0) limits.units = units;
+  Draws draws = DrawSeed(seed, limits);
+  draws.rail_motors = 0;
+  draws.armed[Index(FaultSite::kOldAnswers)] = false;
+  ExpectKept(seed, Night(draws, {.replay = true}).Run());
+}
+
 TEST(Soak, KeepsEveryRuleOverAFewSeeds) {
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) ExpectKept(seed, 19);
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) ExpectKept(seed, RunSeed(seed, 19));
 }
 
 TEST(Soak, OneSeedIsOneRun) {
