@@ -43,8 +43,8 @@ double StructureOf(std::span<const double> medians, std::span<const double> sigm
   return (chi_square - (bins - 1)) / bins;
 }
 
-// Periods a turn between two orders. A sine halfway loses 1 - sinc(step / 2) of its amplitude over a
-// whole turn: 10 %. Half of the step loses 3 % at twice the cost, twice of it 36 %.
+// Periods a turn between two orders. A sine halfway loses 1 - sinc(step / 2) of its amplitude over
+// a whole turn: 10 %. Half of the step loses 3 % at twice the cost, twice of it 36 %.
 constexpr double kOrderStep = 0.5;
 
 std::vector<double> OrdersOf(double gear) {
