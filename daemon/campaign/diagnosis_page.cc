@@ -38,7 +38,7 @@ std::string ReliabilityOf(const sim::CauseFound& cause) {
   const std::vector<double> posterior = sim::PosteriorOf(cause);
   std::string text = PercentOf(posterior.front());
   for (std::size_t k = 1; k < cause.candidates.size(); ++k)
-    text += fmt::format("; {} {}", cause.candidates[k], PercentOf(posterior[k]));
+    text += fmt::format("; {} {}", WordsFor(cause.candidates[k]).name, PercentOf(posterior[k]));
   return text;
 }
 

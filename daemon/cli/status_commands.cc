@@ -315,6 +315,7 @@ std::vector<HistoryTable> HistoryTables() {
         "theta_low_vectors", "theta_high_vectors", "theta_witness", "phi_from_vectors",
         "phi_to_vectors", "phi_low_vectors", "phi_high_vectors", "phi_witness", "unit_id",
         "serial"}},
+      {"measured", {"configuration", "exposure", "status", "error_um", "at"}},
       {"unit", {"at", "enabled", "reason", "unit_id", "serial"}}};
 }
 

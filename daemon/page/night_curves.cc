@@ -65,6 +65,18 @@ json RoundedColumn(const std::vector<double>& values) {
   return column;
 }
 
+json PowerJson(const PlanPower& power) {
+  json rails = json::object();
+  for (const auto& [rail, parts] : power.rail_W)
+    rails[std::to_string(rail.value)] = RoundedColumn(parts);
+  return {{"configuration", power.configuration},
+          {"end_s", RoundedOrNull(power.end_s)},
+          {"rail_limit_W", RoundedOrNull(power.rail_limit_W)},
+          {"limit_W", RoundedOrNull(power.limit_W)},
+          {"rail_W", std::move(rails)},
+          {"total_W", RoundedColumn(power.total_W)}};
+}
+
 }  // namespace
 
 PlanPower PowerOverTime(const Plan& plan, const PlanJob& job, const Layout& layout,
@@ -133,6 +145,18 @@ void NightCurves::Take(PlanPower power) {
     power_ = std::move(power);
 }
 
+void NightCurves::TakePreview(std::uint64_t plan, PlanPower power) {
+  const std::lock_guard lock(mutex_);
+  preview_plan_ = plan;
+  preview_power_ = std::move(power);
+}
+
+std::optional<std::string> NightCurves::PreviewText(std::uint64_t plan) const {
+  const std::lock_guard lock(mutex_);
+  if (plan == 0 || plan != preview_plan_) return std::nullopt;
+  return PowerJson(preview_power_).dump();
+}
+
 std::string NightCurves::Text(std::int64_t since_ms) const {
   const std::lock_guard lock(mutex_);
   const auto column = [since_ms](const auto& list, auto value_of) {
@@ -141,9 +165,6 @@ std::string NightCurves::Text(std::int64_t since_ms) const {
   json phases = json::array();
   for (std::size_t p = 0; p < kUnitPhaseCount; ++p)
     phases.push_back(column(samples_, [p](const Sample& sample) { return sample.phases[p]; }));
-  json rails = json::object();
-  for (const auto& [rail, parts] : power_.rail_W)
-    rails[std::to_string(rail.value)] = RoundedColumn(parts);
   const json all{
       {"samples",
        {{"at_ms", column(samples_, [](const Sample& sample) { return sample.at_ms; })},
@@ -173,13 +194,7 @@ std::string NightCurves::Text(std::int64_t since_ms) const {
                             return RoundedOrNull(most);
                           })},
         {"total_W", column(peaks_, [](const Peak& peak) { return RoundedOrNull(peak.total_W); })}}},
-      {"power",
-       {{"configuration", power_.configuration},
-        {"end_s", RoundedOrNull(power_.end_s)},
-        {"rail_limit_W", RoundedOrNull(power_.rail_limit_W)},
-        {"limit_W", RoundedOrNull(power_.limit_W)},
-        {"rail_W", std::move(rails)},
-        {"total_W", RoundedColumn(power_.total_W)}}}};
+      {"power", PowerJson(power_)}};
   return all.dump();
 }
 

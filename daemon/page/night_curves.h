@@ -11,6 +11,7 @@
 #include <deque>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,10 +53,15 @@ class NightCurves {
   void Take(const StatusBatch& batch);
   /// The newest plan of a configuration, of the planner's thread.
   void Take(PlanPower power);
+  /// The plan of the newest preview, likewise. `plan` is the number that its asker got.
+  void TakePreview(std::uint64_t plan, PlanPower power);
 
   /// All that is newer than an instant: {samples, exposures, plans, power}, as columns. `power` is
   /// the longest plan of the newest configuration over its time. Any thread may ask.
   [[nodiscard]] std::string Text(std::int64_t since_ms) const;
+  /// The power of a preview's plan, as `power` above; none: another preview came since, or none
+  /// did.
+  [[nodiscard]] std::optional<std::string> PreviewText(std::uint64_t plan) const;
 
  private:
   struct Sample {
@@ -88,6 +94,8 @@ class NightCurves {
   std::deque<Exposure> exposures_;
   std::deque<Peak> peaks_;
   PlanPower power_;
+  PlanPower preview_power_;
+  std::uint64_t preview_plan_ = 0;  // 0: none
   float load_max_ = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/page/assets.h"
@@ -54,6 +55,14 @@ HttpAnswer MotionOfPreview(const KeptPlans& plans, const HttpRequest& request) {
   return MotionsOf(motion != nullptr ? std::vector{motion} : std::vector<KeptPlans::Motion>());
 }
 
+HttpAnswer PowerOfPreview(const NightCurves& night, const HttpRequest& request) {
+  const auto plan = NumberIn(request, "plan");
+  if (!plan) return NoNumber("plan");
+  auto text = night.PreviewText(*plan);
+  if (!text) return HttpFailure(404, "refused", "the power of this plan is not kept, or no longer");
+  return {.content_type = "application/json", .body = std::move(*text)};
+}
+
 HttpAnswer Curves(const NightCurves& night, const HttpRequest& request) {
   const bool asked = request.query.contains("since_ms");
   const auto since_ms = NumberIn(request, "since_ms");
@@ -90,6 +99,11 @@ void AddPageRoutes(const PageParts& parts, HttpRouter* router) {
                .verb = "preview",
                .answer = [plans = parts.plans](const HttpRequest& request, const Caller&) {
                  return MotionOfPreview(*plans, request);
+               }});
+  router->Add({.path = "/preview-power",
+               .verb = "preview",
+               .answer = [night = parts.night](const HttpRequest& request, const Caller&) {
+                 return PowerOfPreview(*night, request);
                }});
   AddDiagnosisRoutes(parts.diagnosis, {parts.store, parts.layout}, router);
   router->Add({.path = "/curves",

@@ -1,7 +1,7 @@
 // The routes of the operators' page. The page's own files are for everybody, because they show
 // nothing of the fleet. Layout, stream and curves take the right to ask for the status, motions of
-// plans that of history, the motion of a preview that to make one. None of them asks the core.
-// Everything else that the page does goes through the verbs of /api (http/api_routes.h).
+// plans that of history, motion and power of a preview that to make one. None of them asks the
+// core. Everything else that the page does goes through the verbs of /api (http/api_routes.h).
 #pragma once
 
 #include <string>

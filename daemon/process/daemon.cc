@@ -363,10 +363,12 @@ PlanDone Daemon::Plan(const PlannerWork& work, const std::atomic<bool>& ending,
 /// Pages get the plan from here, and the core has no part in it.
 void Daemon::KeepForPages(const PlannerWork& work, const struct Plan& plan) {
   std::string motion = EncodeMotion(plan, *layout_, work.drives);
-  if (work.job.purpose == PlanPurpose::kPreview)
-    return status_.plans.PutPreview(work.job.job, std::move(motion));
-  status_.plans.Put(work.configuration, std::move(motion));
   PlanPower power = PowerOverTime(plan, work.job, *layout_, work.drives);
+  if (work.job.purpose == PlanPurpose::kPreview) {
+    status_.night.TakePreview(work.job.job, std::move(power));
+    return status_.plans.PutPreview(work.job.job, std::move(motion));
+  }
+  status_.plans.Put(work.configuration, std::move(motion));
   power.configuration = work.configuration;
   power.at = WallTime::Now();
   status_.night.Take(std::move(power));

@@ -82,6 +82,17 @@ Json HistoryJson(const std::vector<MoveHistory>& moves) {
   return rows;
 }
 
+Json HistoryJson(const std::vector<UnitMeasured>& measured) {
+  Json rows = Json::array();
+  for (const UnitMeasured& one : measured)
+    rows.push_back({{"configuration", one.configuration},
+                    {"exposure", one.exposure},
+                    {"status", Name(one.status)},
+                    {"error_um", one.error_um ? Json(*one.error_um) : Json()},
+                    {"at", ToIso8601(one.at)}});
+  return rows;
+}
+
 Json HistoryJson(const std::vector<ParameterHistory>& parameters) {
   Json rows = Json::array();
   for (const auto& [row, at] : parameters)

@@ -15,5 +15,6 @@ Json HistoryJson(const std::vector<TuningHistory>& tunings);
 Json HistoryJson(const std::vector<AlarmHistory>& alarms);
 Json HistoryJson(const std::vector<UnitHistory>& units);
 Json HistoryJson(const std::vector<MeasurementHistory>& measurements);
+Json HistoryJson(const std::vector<UnitMeasured>& measured);
 
 }  // namespace focalfleet

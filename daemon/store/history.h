@@ -118,6 +118,15 @@ struct MeasurementHistory {
   bool moved_since = false;
 };
 
+/// A unit in an exposure.
+struct UnitMeasured {
+  std::uint64_t configuration = 0;
+  std::uint64_t exposure = 0;
+  MeasurementStatus status = MeasurementStatus::kMeasured;
+  std::optional<double> error_um;  // from its target
+  WallTime at;                     // when it was stored
+};
+
 struct ModelHistory {
   ModelRow row;  // without its text
   WallTime at;

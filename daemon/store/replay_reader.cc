@@ -116,7 +116,44 @@ Status AddErrors(Connection& connection, std::uint64_t configuration, ReplayPage
   }
 }
 
+/// The exposures from ?1 on and before ?2, one after the other by the key, and unit ?3 in each.
+constexpr const char* kUnitInExposures =
+    "WITH RECURSIVE exposed(exposure) AS ("
+    "SELECT min(exposure) FROM measurement WHERE exposure >= ?1 "
+    "UNION ALL SELECT (SELECT min(exposure) FROM measurement WHERE exposure > exposed.exposure) "
+    "FROM exposed WHERE exposure < ?2) "
+    "SELECT unit_id, exposure, configuration, status, error_um, at_ns FROM exposed "
+    "JOIN measurement USING (exposure) WHERE exposure < ?2 AND unit_id = ?3 "
+    "ORDER BY exposure DESC";
+
 }  // namespace
+
+Result<std::vector<UnitMeasured>> StoreReader::MeasurementsOf(UnitId unit,
+                                                              std::uint64_t configuration) {
+  FOCALFLEET_TRY_ASSIGN(const std::int64_t first,
+                        FirstKeyOf(*connection_, kExposures, configuration));
+  FOCALFLEET_TRY_ASSIGN(const std::int64_t next,
+                        FirstKeyOf(*connection_, kExposures, configuration + 1));
+  FOCALFLEET_TRY_ASSIGN(Statement statement, connection_->Prepare(kUnitInExposures));
+  statement.Bind(1, first);
+  statement.Bind(2, next);
+  statement.Bind(3, unit.value);
+  std::vector<UnitMeasured> all;
+  for (;;) {
+    const auto row = statement.Next();
+    if (!row) return tl::unexpected<Error>(connection_->Named(row.error()));
+    if (!*row) return all;
+    Cells cells(statement, "measurement", 2);
+    UnitMeasured measured;
+    measured.exposure = cells.Whole<std::uint64_t>(1);
+    measured.configuration = cells.Whole<std::uint64_t>(2);
+    measured.status = cells.Code(3, kLastMeasurementStatus);
+    if (!cells.IsNull(4)) measured.error_um = cells.Real(4);
+    measured.at = cells.Time(5);
+    all.push_back(measured);
+    if (cells.error()) return tl::unexpected<Error>(connection_->Named(*cells.error()));
+  }
+}
 
 Result<ReplayPage> StoreReader::Replay(std::uint64_t configuration, std::uint64_t after,
                                        std::uint32_t limit) {

@@ -53,6 +53,9 @@ class StoreReader {
   Result<std::vector<OpenAlarmRow>> EarlierAlarms(std::uint32_t limit, const Period& period = {});
   /// The measurements of one exposure, by unit id.
   Result<std::vector<MeasurementHistory>> Measurements(std::uint64_t exposure);
+  /// The unit in each exposure of a configuration, the newest first. Cost: some 80 look-ups and two
+  /// for each exposure, however many rows there are.
+  Result<std::vector<UnitMeasured>> MeasurementsOf(UnitId unit, std::uint64_t configuration);
   /// The newest exposure of a configuration; none: it was never measured.
   Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
   Result<std::vector<ModelHistory>> Models(std::uint32_t limit);

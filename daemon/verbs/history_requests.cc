@@ -1,6 +1,7 @@
 #include "daemon/verbs/history_requests.h"
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -133,6 +134,19 @@ Json NewestOf(const std::vector<TuningHistory>& history) {
             newest, [&](const TuningHistory& other) { return other.row.axis == entry.row.axis; }))
       newest.push_back(entry);
   return HistoryJson(newest);
+}
+
+/// The measurements of the unit in the configurations of its moves, the newest first.
+Result<std::vector<UnitMeasured>> MeasuredAfter(const std::vector<MoveHistory>& moves, UnitId unit,
+                                                StoreReader* store) {
+  std::set<std::uint64_t, std::greater<>> configurations;
+  for (const MoveHistory& move : moves) configurations.insert(move.configuration);
+  std::vector<UnitMeasured> measured;
+  for (const std::uint64_t configuration : configurations) {
+    FOCALFLEET_TRY_ASSIGN(const auto some, store->MeasurementsOf(unit, configuration));
+    measured.insert(measured.end(), some.begin(), some.end());
+  }
+  return measured;
 }
 
 /// All events of the period, as far as they are looked at and not after `newest`, in any order.
@@ -271,7 +285,10 @@ Result<StoreReading> AskHistory(const ControlRequest& request, const FleetView& 
     FOCALFLEET_TRY_ASSIGN(const auto moves, store->Moves(id, limit, period, end));
     if (end) return Json{{"moves", HistoryJson(moves)}};
     FOCALFLEET_TRY_ASSIGN(const auto places, store->Units(id, limit, period));
-    return Json{{"moves", HistoryJson(moves)}, {"unit", HistoryJson(places)}};
+    FOCALFLEET_TRY_ASSIGN(const auto measured, MeasuredAfter(moves, id, store));
+    return Json{{"moves", HistoryJson(moves)},
+                {"measured", HistoryJson(measured)},
+                {"unit", HistoryJson(places)}};
   });
 }
 

@@ -28,12 +28,15 @@ export async function withBrowser(use) {
   }
 }
 
-/** A tab; faults of its scripts, and what its policy forbids, fail the test. */
+/** A tab; faults of its scripts, what its policy forbids, and other hosts fail the test. */
 export async function openTab(browser, options = {}) {
   const context = await browser.newContext({viewport: {width: 1400, height: 900}, ...options});
   const tab = await context.newPage();
   tab.setDefaultTimeout(kPatience_ms);
   tab.faults = [];
+  tab.losses = [];  // files and answers that did not come
+  tab.on("requestfailed", (request) => tab.losses.push(`${request.url()}: ` +
+      request.failure()?.errorText));
   tab.on("pageerror", (error) => tab.faults.push(String(error)));
   tab.on("console", (message) => {
     // A refusal is an answer, and a broken link is the point of a scenario.
@@ -41,14 +44,22 @@ export async function openTab(browser, options = {}) {
     if (message.type() === "error" && !expected.test(message.text()))
       tab.faults.push(message.text());
   });
+  tab.on("request", (request) => {
+    if (!/^(blob|data):/.test(request.url()) && !request.url().startsWith(`${given.url}/`))
+      tab.faults.push(`it asks another host: ${request.url()}`);
+  });
   await tab.goto(given.url);
   return tab;
 }
 
 export async function signIn(tab, role) {
   // The page asks by itself once it knows that the daemon wants a token.
-  await tab.waitForFunction(() => document.getElementById("token-dialog").open ||
-      (window.focalfleetPage && window.focalfleetPage.linkState !== "waiting"));
+  try {
+    await tab.waitForFunction(() => document.getElementById("token-dialog").open ||
+        (window.focalfleetPage && window.focalfleetPage.linkState !== "waiting"));
+  } catch {
+    assert.fail(`the page does not begin; ${tab.faults.join("; ")}; ${tab.losses.join("; ")}`);
+  }
   if (!await tab.locator("#token-dialog").isVisible()) await tab.click("#sign-in");
   await tab.fill("#token", given.tokens[role]);
   await tab.click("#token-form button[type=submit]");

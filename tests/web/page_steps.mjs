@@ -26,6 +26,12 @@ async function night(browser) {
   await textOf(tab, "#link", "signed out");
   const sent = watchVerbs(tab);
 
+  say("a page that did not come whole is loaded again");
+  await tab.route("**/page/near.js", (route) => route.abort(), {times: 1});
+  await tab.reload();
+  await textOf(tab, "#fleet-summary", "did not come whole");
+  await textOf(tab, "#link", "signed out");
+
   say("a wrong token is refused, with the daemon's words");
   await tab.fill("#token", "fft_wrong");
   await tab.press("#token", "Enter");
@@ -48,11 +54,20 @@ async function night(browser) {
   await textOf(tab, "#stop-state", "the daemon has it");
   assert.equal(sent.filter((verb) => verb === "stop").length, 2);
 
+  say("stop works while the page asks for a token");
+  await tab.click("#sign-in");
+  await tab.click("#stop");
+  await tab.waitForFunction(() => window.focalfleetPage.stop.sent === 3);
+  await textOf(tab, "#stop-state", "the daemon has it");
+  await tab.press("#token", "Escape");
+  assert.ok(await tab.locator("#token-dialog").isHidden());
+
   say("an operator drops a file: preview, apply, progress, result");
   await signIn(tab, "operator");
   await dropFile(tab, "night-1.csv", targets());
   await textOf(tab, "#preview", "Preview of night-1.csv");
   await textOf(tab, "#preview", `of ${given.count} targets`);
+  await textOf(tab, "#preview", /at most \d+ W; no limit is set/);
   await tab.screenshot({path: `${given.out}/preview.png`});
   assert.ok(!sent.includes("apply"), "a preview applies nothing");
   await tab.click("#apply");
@@ -77,16 +92,33 @@ async function night(browser) {
     const entries = [...document.querySelectorAll("#legend li")].map(({textContent}) => textContent);
     return Number.parseInt(entries.find((text) => text.endsWith("moves")), 10) > count / 2;
   }, given.count);
+  await tab.selectOption("#theme", "power");
+  await tab.waitForFunction((count) => window.focalfleetPage.plate.counts[2] > count / 2, given.count);
+  await tab.selectOption("#theme", "state");
   await tab.screenshot({path: `${given.out}/moving.png`});
   await tab.click("#stop");
   await textOf(tab, "#configuration", /stopped/);
   await tab.screenshot({path: `${given.out}/stopped.png`});
 
-  say("a unit: arms, knowledge, moves newest first");
+  say("where the errors are");
+  await tab.getByRole("button", {name: "Map of errors"}).click();
+  assert.equal(await tab.locator("#theme").inputValue(), "error");
+  await textOf(tab, "#legend", /[1-9]\d*above 100 µm/);
+  await tab.screenshot({path: `${given.out}/errors.png`});
+  await tab.selectOption("#theme", "state");
+
+  say("a unit: arms, knowledge, neighbours, moves newest first, parameters, alarms");
   await tab.fill("#find-id", "7");
   await tab.press("#find-id", "Enter");
   await textOf(tab, "#unit tbody", /arrived/);
   assert.match(await tab.locator("#unit").innerText(), /theta[\s\S]*phi[\s\S]*node/);
+  assert.ok(await tab.locator("#beside button").count() >= 2);
+  await tab.click("#unit summary:has-text('Parameters')");
+  await textOf(tab, "#unit", /repeat\s*\d+\s*default[\s\S]*Waves: \w+, at [\d.]+ V/);
+  await tab.click("#unit summary:has-text('Alarms and changes')");
+  await textOf(tab, "#unit", /serial \d+, enabled|None is known/);
+  assert.deepEqual(await axeFindings(tab), []);
+  await tab.screenshot({path: `${given.out}/unit.png`});
 
   say("what happened, newest first");
   await tab.click("#events summary");

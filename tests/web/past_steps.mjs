@@ -48,6 +48,9 @@ export async function past(browser) {
   await seek(tab, 0.5);
   assert.ok(apart(before, await fibres(tab)) > 1, "units are on their way");
   await textOf(tab, "#legend", /[1-9]\d*moves/);
+  await tab.selectOption("#theme", "power");
+  await textOf(tab, "#legend", /[1-9]\d*one turns|[1-9]\d*both turn/);
+  await tab.selectOption("#theme", "state");
   await tab.screenshot({path: `${given.out}/preview-motion.png`});
   await seek(tab, 1);
   const planned = await fibres(tab);
@@ -108,6 +111,7 @@ export async function past(browser) {
   await seek(tab, 1);
   assert.ok(apart(stoppedAt, await fibres(tab)) < 0.05, "it ends where the units were stopped");
   await textOf(tab, "#replay-trouble", /\d+ stopped/);
+  await textOf(tab, "#legend", /ready0moves/);
   await tab.screenshot({path: `${given.out}/replay.png`});
 
   say("stop works meanwhile, and live is back at a press");
@@ -143,12 +147,21 @@ export async function past(browser) {
   await tab.context().close();
 }
 
-/** The streams that the daemon serves now. */
+const askStream = () => fetch(`${given.url}/stream`, {headers:
+  {Authorization: `Bearer ${given.tokens.viewer}`}});
+
+/** Whether the daemon serves one stream more: its status. */
 async function streams() {
-  const answer = await fetch(`${given.url}/stream`, {headers:
-    {Authorization: `Bearer ${given.tokens.viewer}`}});
+  const answer = await askStream();
   await answer.body.cancel();
   return answer.status;
+}
+
+/** A stream of somebody else, who looks on until it is cancelled. */
+async function hold() {
+  const answer = await askStream();
+  assert.equal(answer.status, 200);
+  return answer.body;
 }
 
 export async function tabs(browser) {
@@ -179,6 +192,17 @@ export async function tabs(browser) {
   say("a tab with another token has its own");
   const operator = await open("operator");
   assert.equal(operator.streams, 1);
+
+  say("where all places are taken, the page says so, and begins when one is free");
+  const held = await hold();
+  const late = await openTab(browser);
+  await signIn(late, "engineer");
+  await textOf(late, "#link", "full");
+  await textOf(late, "#stale", /all 3 places for viewers are taken/);
+  await held.cancel();
+  await isLive(late);
+  assert.deepEqual(late.faults, []);
+  await late.context().close();
 
   say("what moves is seen in all of them");
   await operator.bringToFront();
@@ -223,6 +247,16 @@ export async function study(browser) {
   assert.ok(Math.max(...power.total_W) > 0);
   assert.deepEqual(await axeFindings(tab), []);
   await tab.screenshot({path: `${given.out}/curves.png`});
+
+  say("what a unit's moves came to, by its exposures");
+  await tab.click("#show-plate");
+  await tab.fill("#find-id", "7");
+  await tab.press("#find-id", "Enter");
+  await tab.locator("#unit tbody tr").first().waitFor();
+  const [offBy] = await tab.locator("#unit tbody tr td:last-child").allInnerTexts();
+  assert.match(offBy, /^[\d.]+ µm$/, "the newest move");
+  await tab.screenshot({path: `${given.out}/unit-measured.png`});
+  await tab.click("#show-curves");
 
   say("a fresh tab has the same night at once");
   const fresh = await openTab(browser);

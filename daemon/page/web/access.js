@@ -11,6 +11,9 @@ export class Access {
     const dialog = find("token-dialog");
     find("sign-in").addEventListener("click", () => this.open(""));
     find("token-cancel").addEventListener("click", () => dialog.close());
+    dialog.addEventListener("keydown", (event) => {
+      if (event.key === "Escape") dialog.close();
+    });
     find("token-form").addEventListener("submit", (event) => {
       event.preventDefault();
       this.use(find("token").value.trim());
@@ -20,7 +23,7 @@ export class Access {
   open(reason) {
     setText(find("token-reason"), reason);
     const dialog = find("token-dialog");
-    if (!dialog.open) dialog.showModal();
+    if (!dialog.open) dialog.show();  // stop stays at hand
     find("token").focus();
   }
 

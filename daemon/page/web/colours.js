@@ -47,21 +47,47 @@ function classTexts(limits, unit) {
   return [...limits.map((limit) => `up to ${limit} ${unit}`), `above ${limits.at(-1)} ${unit}`];
 }
 
-/** Colours that many groups share: group k has colour k, modulo their number. */
+/** Colours that many groups share. */
 const kSeries = ["s0", "s1", "s2", "s3", "s4", "s5", "s6"];
 
-function groups(fleet, column, noun) {
+/** For each group a colour that no group beside it has, as far as there are enough of them. */
+function coloursOfGroups(beside) {
+  const chosen = [];
+  const uses = kSeries.map(() => 0);
+  beside.forEach((others, index) => {
+    const taken = new Set([...others].map((other) => chosen[other]));
+    const free = kSeries.map((_, k) => k).filter((k) => !taken.has(k));
+    chosen[index] = free.length === 0 ? index % kSeries.length
+      : free.reduce((best, k) => uses[k] < uses[best] ? k : best);
+    ++uses[chosen[index]];
+  });
+  return chosen.map((k) => kSeries[k]);
+}
+
+function groups(neighbours, column, noun) {
   const values = [...new Set(column)].sort((a, b) => a - b);
   const indexOf = new Map(values.map((value, index) => [value, index]));
+  const beside = values.map(() => new Set());
+  column.forEach((value, u) => {
+    for (const v of neighbours.of(u))
+      if (column[v] !== value) beside[indexOf.get(value)].add(indexOf.get(column[v]));
+  });
+  const colours = coloursOfGroups(beside);
   return {
-    entries: values.map((value, index) => ({colour: kSeries[index % kSeries.length],
-      text: `${noun} ${value}`})),
+    entries: values.map((value, index) => ({colour: colours[index], text: `${noun} ${value}`})),
     indexOf: (u) => indexOf.get(column[u]),
   };
 }
 
-/** The themes, by name: {title, entries: [{colour, text}], indexOf(u)}. */
-export function makeThemes(fleet, now_ms) {
+/** A unit draws power by its motors that turn. */
+const kMotors = {title: "Power: motors that turn", entries: [{colour: "none", text: "none turns"},
+  {colour: "q2", text: "one turns"}, {colour: "q4", text: "both turn"}]};
+
+/**
+ * The themes, by name: {title, entries: [{colour, text}], indexOf(u)}; `followsFrames`: each frame
+ * may change the index of any unit.
+ */
+export function makeThemes(fleet, neighbours, now_ms) {
   const scale = (limits, unit, of, none) => ({
     entries: [...classTexts(limits, unit).map((text, k) => ({colour: `q${k}`, text})),
       {colour: "none", text: none}],
@@ -81,8 +107,9 @@ export function makeThemes(fleet, now_ms) {
     age: {title: "Last change",
       ...scale(kAgeLimits_s, "s ago", (u) => (now_ms() - fleet.changed_ms[u]) / 1000,
           "not since this page began")},
-    bus: {title: "Bus", ...groups(fleet, fleet.bus, "bus")},
-    rail: {title: "Power rail", ...groups(fleet, fleet.rail, "rail")},
+    power: {...kMotors, indexOf: (u) => fleet.motorsOf(u), followsFrames: true},
+    bus: {title: "Bus", ...groups(neighbours, fleet.bus, "bus")},
+    rail: {title: "Power rail", ...groups(neighbours, fleet.rail, "rail")},
   };
 }
 
@@ -94,6 +121,7 @@ export function makeFilmThemes(film, themes) {
       const value = film.error_um[u];
       return Number.isNaN(value) ? kErrorLimits_um.length + 1 : classOf(value, kErrorLimits_um);
     }},
+    power: {...kMotors, indexOf: (u) => film.motorsOf(u)},
     bus: themes.bus,
     rail: themes.rail,
   };

@@ -19,9 +19,22 @@ function byReason(rows) {
   return [...counts].sort((a, b) => b[1] - a[1]);
 }
 
+/** The highest power of a plan, and of its fullest rail, against their limits; 0: there is none. */
+function powerText(peak_W, {limit_W, rail_limit_W, rail_W}) {
+  const of = (watts, limit) => `at most ${watts.toFixed(0)} W` +
+      (limit > 0 ? ` of ${limit.toFixed(0)} W` : "");
+  const rails = Object.entries(rail_W).map(([rail, parts]) => [rail, Math.max(...parts)])
+    .sort((a, b) => b[1] - a[1]);
+  const [fullest] = rails;
+  return of(peak_W, limit_W) + (rails.length > 1 || rail_limit_W > 0
+    ? `; rail ${fullest[0]}, the fullest, ${of(fullest[1], rail_limit_W)}` : "") +
+      (limit_W > 0 || rail_limit_W > 0 ? "" : "; no limit is set");
+}
+
 export class Configuration {
-  constructor(api, access, plate, player, onUnit) {
-    Object.assign(this, {api, access, plate, player, onUnit});
+  /** `onUnit(id)`: the unit is to be shown; `onErrors()`: all units by their distance. */
+  constructor(api, access, plate, player, {onUnit, onErrors}) {
+    Object.assign(this, {api, access, plate, player, onUnit, onErrors});
     this.facts = null;
     this.file = null;
     this.isShown = false;  // its plan is on the plate
@@ -110,11 +123,13 @@ export class Configuration {
     const apply = this.access.guard(make("button", {type: "button", class: "main", id: "apply",
       onclick: () => this.apply(apply, corrections.value)},
     `Move ${counted(preview.moving, "unit")}`), "apply");
+    const power = make("dd", {}, `at most ${preview.peak_power_W.toFixed(0)} W`);
+    if (preview.moving > 0) this.addPower(power, preview);
     this.say(make("h3", {}, `Preview of ${this.file.source}`), make("dl", {},
         make("dt", {}, "served"), make("dd", {}, `${preview.served.toLocaleString("en")} of ` +
             counted(preview.targeted, "target")),
         make("dt", {}, "takes"), make("dd", {}, duration(preview.makespan_s)),
-        make("dt", {}, "power"), make("dd", {}, `at most ${preview.peak_power_W.toFixed(0)} W`)),
+        make("dt", {}, "power"), power),
     ...(not === 0 ? [] : [make("p", {}, `${counted(not, "target")} not served, marked on the plate:`),
       make("ul", {}, ...byReason(preview.unserved).map(([reason, count]) =>
         make("li", {}, `${count}: ${reason}`))),
@@ -125,6 +140,15 @@ export class Configuration {
     make("p", {class: "buttons"}, apply, corrections,
         make("button", {type: "button", onclick: () => this.clear()}, "Discard")),
     make("p", {class: "trouble", id: "apply-trouble", role: "alert"}));
+  }
+
+  async addPower(element, preview) {
+    try {
+      const power = await this.api.get(`/preview-power?plan=${preview.plan}`);
+      setText(element, powerText(preview.peak_power_W, power));
+    } catch {
+      // Another preview came since: the highest power stays alone.
+    }
   }
 
   /** The plan in motion, from the places where the units stood when it was made. */
@@ -242,7 +266,9 @@ export class Configuration {
     if (worst.length === 0) return [];
     return [make("h3", {}, "Farthest from their targets"), make("table", {}, make("tbody", {},
         ...worst.map((u) => make("tr", {}, make("td", {}, this.unitButton(fleet.id[u])),
-            make("td", {}, micrometres(fleet.error_um[u]))))))];
+            make("td", {}, micrometres(fleet.error_um[u])))))),
+    make("p", {class: "buttons"}, make("button", {type: "button", onclick: () => this.onErrors()},
+        "Map of errors"))];
   }
 
   async addUnserved(element, id) {

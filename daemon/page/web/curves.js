@@ -162,7 +162,8 @@ export class Curves {
     const {samples} = this.data;
     const sums = kGroups.map(({phases}) => samples.at_ms.map((_, k) => phases.reduce((sum, name) =>
       sum + samples.phases[kPhases.indexOf(name)][k], 0)));
-    this.chart("states", {title: "Units by state", note: "One line for each; they add up to the fleet.",
+    this.chart("states", {title: "Units by state", note: "One line for each; they add up to the fleet. Disabled " +
+        "units count in their state, too.",
       isTime: true, unit: "", x: samples.at_ms.map((ms) => ms / 1000),
       series: [...kGroups.map(({text, colour}, k) => ({label: text, colour, values: sums[k]})),
         {label: "disabled", colour: "disabled", dash: [3, 3], values: samples.disabled}]});

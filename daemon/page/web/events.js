@@ -5,6 +5,12 @@ import {clock, find, make} from "/page/dom.js";
 
 const kRowsOfPage = 20;
 
+/** An event of the daemon as a line. */
+export function eventLine(event) {
+  return make("p", {class: `event ${event.severity}`}, make("span", {class: "hint"},
+      `${clock(event.at)} `), event.name ? `${event.name}: ` : "", event.text);
+}
+
 export class Events {
   /** `onNews()` is called when something has changed. */
   constructor(api, onNews) {
@@ -33,9 +39,7 @@ export class Events {
           {limit: kRowsOfPage, ...(before === null ? {} : {until_ns: before})});
       body.querySelector(".more")?.remove();
       if (before === null) body.replaceChildren();
-      body.append(...events.reverse().map((event) => make("p", {class: `event ${event.severity}`},
-          make("span", {class: "hint"}, `${clock(event.at)} `), event.name ? `${event.name}: ` : "",
-          event.text)));
+      body.append(...events.reverse().map(eventLine));
       if (events.length === 0 && before === null)
         body.append(make("p", {class: "hint"}, "Nothing has happened yet."));
       if (events.length === kRowsOfPage)

@@ -85,6 +85,16 @@ export class Film {
     return values[at + 2] + share * values[at + 3];
   }
 
+  /** How many motors of the unit turn at the instant. */
+  motorsOf(u) {
+    let motors = 0;
+    for (const columns of this.pieces) {
+      const at = columns.lastBegun(u, this.t_s);
+      if (at >= 0 && this.t_s < columns.values[at + 1] && columns.values[at + 3] !== 0) ++motors;
+    }
+    return motors;
+  }
+
   /** Angles and states are those of the instant. */
   seek(t_s) {
     this.t_s = t_s;

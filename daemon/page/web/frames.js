@@ -74,6 +74,7 @@ export class Fleet {
     this.enabled = new Uint8Array(n).fill(1);
     this.fault = new Uint8Array(n);
     this.changed_ms = new Float64Array(n).fill(NaN);  // this browser's clock
+    this.motors = new Uint8Array(n);  // that turned with the last frame that had its angles
     this.facts = null;
     this.factsText = "";
     this.number = 0;
@@ -124,6 +125,7 @@ export class Fleet {
       this.takeAngles(view, u, from);
       this.changed_ms[u] = now_ms;
     });
+    if (snapshot) this.motors.fill(0);  // the time since the frame before is not known
     return {snapshot, facts: isNew};
   }
 
@@ -141,8 +143,17 @@ export class Fleet {
   }
 
   takeAngles(view, u, from) {
-    this.theta[u] = angleOf(view.getUint16(from, true));
-    this.phi[u] = angleOf(view.getUint16(from + 2, true));
+    const theta = angleOf(view.getUint16(from, true));
+    const phi = angleOf(view.getUint16(from + 2, true));
+    // An angle that was not known, or is no longer, has not turned: it differs from nothing.
+    this.motors[u] = (Math.abs(theta - this.theta[u]) > 0) + (Math.abs(phi - this.phi[u]) > 0);
+    this.theta[u] = theta;
+    this.phi[u] = phi;
+  }
+
+  /** How many motors of the unit turned with the newest frame. */
+  motorsOf(u) {
+    return this.changed_ms[u] === this.received_ms ? this.motors[u] : 0;
   }
 
   takeState(view, u, from) {

@@ -88,7 +88,8 @@ class Page {
         (u) => this.player?.select(u));
     this.alarms = new Alarms(this.api, this.access, showUnit);
     this.player = new Player(this.plate, () => this.filmChanged(), () => this.showLegend());
-    this.configuration = new Configuration(this.api, this.access, this.plate, this.player, showUnit);
+    this.configuration = new Configuration(this.api, this.access, this.plate, this.player,
+        {onUnit: showUnit, onErrors: () => this.showErrors()});
     this.earlier = new Earlier(this.api, this.access, this.plate, this.player);
     this.commands = new Commands(this.api, this.access);
     this.events = new Events(this.api, () => this.commands.note());
@@ -139,8 +140,18 @@ class Page {
     this.showLegend();
   }
 
+  /** All units of the plate, by their distance from their targets. */
+  showErrors() {
+    this.sheets.show("plate");
+    this.plate.view.showAll();
+    this.showScale();
+    const select = find("theme");
+    select.value = "error";
+    select.dispatchEvent(new Event("change"));
+  }
+
   openThemes() {
-    this.themes = makeThemes(this.fleet, () => performance.now());
+    this.themes = makeThemes(this.fleet, this.plate.neighbours, () => performance.now());
     const select = find("theme");
     select.replaceChildren(...Object.entries(this.themes).map(([name, {title}]) =>
       make("option", {value: name}, title)));
@@ -165,6 +176,7 @@ class Page {
     });
     plate.endFrame();
     if (snapshot) plate.placeAll();
+    states = states || Boolean(plate.theme.followsFrames);
     if (!plate.film && (snapshot || states)) plate.reindex();
     // The legend is written now and then, where hundreds change with each frame.
     this.isLegendOld = this.isLegendOld || states;
@@ -225,6 +237,7 @@ class Page {
     this.earlier.note(facts);
     this.alarms.note(facts.alarms);
     this.events.note(facts);
+    this.unit.history.note(facts);
     const down = facts.buses.filter(({link}) => link !== "up");
     const load = Math.max(0, ...facts.buses.map((bus) => bus.load));
     set(find("buses"), "className", down.length > 0 ? "trouble" : "");

@@ -63,7 +63,8 @@ export class Model {
       make("p", {id: "model-trouble", class: "trouble", role: "alert"}),
       make("h3", {}, "Changes, newest first"),
       changes.length === 0 ? make("p", {class: "hint"}, "There was none yet.")
-        : make("table", {}, make("tbody", {}, ...changes.slice(0, 20).map((change) => make("tr", {},
+        : make("table", {}, make("thead", {}, make("tr", {}, ...["since", "model", "campaign"].map((text) =>
+            make("th", {scope: "col"}, text)))), make("tbody", {}, ...changes.slice(0, 20).map((change) => make("tr", {},
             make("td", {}, `${clock(change.at)} UTC`),
             make("td", {}, change.name || "no model"),
             make("td", {}, change.campaign || "–"))))),

@@ -5,6 +5,7 @@
 import {readColours, stateOf} from "/page/colours.js";
 import {Far} from "/page/far.js";
 import {Near} from "/page/near.js";
+import {Neighbours} from "/page/neighbours.js";
 import {Turning} from "/page/turning.js";
 import {View} from "/page/view.js";
 
@@ -27,6 +28,7 @@ export class Plate {
     this.view = new View(fleet);
     this.far = new Far(this);
     this.near = new Near(this);
+    this.neighbours = new Neighbours(fleet);
     const n = fleet.count;
     this.elbow_x = new Float64Array(n).fill(NaN);
     this.elbow_y = new Float64Array(n).fill(NaN);
@@ -237,8 +239,28 @@ export class Plate {
       context.strokeStyle = colour;
       context.stroke();
     };
+    this.drawNeighbours(u);
     ring(Math.max(9, fleet.patrol_max_mm[u] * view.scale), 4, colours.plate);
     ring(Math.max(9, fleet.patrol_max_mm[u] * view.scale), 2, colours.ink);
+  }
+
+  /** Thin rings about the units beside one, where there is room for them. */
+  drawNeighbours(u) {
+    const {context, view, fleet, colours} = this;
+    if (view.pitch_px < kNear_px) return;
+    context.beginPath();
+    for (const v of this.neighbours.of(u)) {
+      const x = view.screenX(fleet.x_mm[v]);
+      const y = view.screenY(fleet.y_mm[v]);
+      const radius = fleet.patrol_max_mm[v] * view.scale;
+      context.moveTo(x + radius, y);
+      context.arc(x, y, radius, 0, kFullCircle);
+    }
+    context.lineWidth = 1;
+    context.setLineDash([3, 5]);
+    context.strokeStyle = colours.muted;
+    context.stroke();
+    context.setLineDash([]);
   }
 
   /** What is shown is old: paled and hatched. */

@@ -74,6 +74,7 @@ export class Player {
   }
 
   timeOf(share) {
+    if (share >= 1000) return this.film.end_s;  // and no rounding before it
     return this.film.begin_s + share / 1000 * (this.film.end_s - this.film.begin_s);
   }
 
@@ -88,7 +89,7 @@ export class Player {
     setText(find("player-at"), text);
     slider.setAttribute("aria-valuetext", text);
     const now_ms = performance.now();
-    if (now_ms > this.legendAt_ms || t_s >= film.end_s) {
+    if (!this.isPlaying || now_ms > this.legendAt_ms || t_s >= film.end_s) {
       this.legendAt_ms = now_ms + kLegend_ms;
       this.onLegend();
     }

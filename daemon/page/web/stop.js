@@ -19,15 +19,17 @@ export class Stop {
 
   async send() {
     const number = ++this.sent;
-    const say = (text) => {
-      if (number === this.sent) setText(find("stop-state"), text);
+    const say = (text, isTrouble = false) => {
+      if (number !== this.sent) return;
+      setText(find("stop-state"), text);
+      find("stop-state").classList.toggle("trouble", isTrouble);
     };
     say("Stop is sent …");
     try {
       await this.api.ask("stop");
       say(`Stop: the daemon has it (${new Date().toISOString().slice(11, 19)} UTC).`);
     } catch (error) {
-      say(`NOT STOPPED: ${error.message}. At the host: focalfleet stop --direct`);
+      say(`NOT STOPPED: ${error.message}. At the host: focalfleet stop --direct`, true);
       if (error.status === 401) this.access.open("Stop needs a token: any role may stop.");
     }
   }

@@ -1,9 +1,10 @@
-// One unit: where it is, what is known and by whom, and what it did, newest first.
+// One unit: where it is, what is known and by whom, who is beside it, and what it did.
 
+import {kStates} from "/page/colours.js";
 import {kOutcomes, kPhases} from "/page/frames.js";
-import {clock, find, make, micrometres, setText} from "/page/dom.js";
+import {find, make, micrometres, setText} from "/page/dom.js";
+import {UnitHistory} from "/page/unit_history.js";
 
-const kRowsOfPage = 10;
 const kRefresh_ms = 2000;
 
 function degrees(axis) {
@@ -23,7 +24,8 @@ export class UnitPanel {
     Object.assign(this, {api, plate, onView, onSelect});
     this.place = -1;
     this.list = make("dl");
-    this.history = make("div");
+    this.beside = make("p", {id: "beside"});
+    this.history = new UnitHistory(api);
     this.asked = 0;
     find("find").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -53,17 +55,27 @@ export class UnitPanel {
 
   select(place) {
     this.onSelect(place);
-    if (place !== this.place) this.history.replaceChildren();
     this.place = place;
     this.plate.selected = place;
     this.plate.dirty = true;
     find("unit-hint").hidden = place >= 0;
-    find("unit").replaceChildren(...(place >= 0 ? [this.list, this.history] : []));
+    find("unit").replaceChildren(...(place >= 0
+      ? [this.list, this.beside, ...this.history.elements] : []));
     if (place < 0) return;
     find("find-id").value = String(this.plate.fleet.id[place]);
     this.list.replaceChildren();
+    this.showBeside();
     this.refresh();
-    this.page(null);
+    this.history.show(this.plate.fleet.id[place]);
+  }
+
+  /** Units whose arms can touch this one's. */
+  showBeside() {
+    const {fleet, neighbours, state} = this.plate;
+    this.beside.replaceChildren(make("span", {class: "hint"}, "Neighbours: "),
+        ...neighbours.of(this.place).flatMap((v) => [make("button", {type: "button",
+          class: "row-button", title: kStates[state[v]].text, onclick: () => this.showId(fleet.id[v])},
+        String(fleet.id[v])), " "]));
   }
 
   async refresh() {
@@ -103,38 +115,5 @@ export class UnitPanel {
       ["bus", `${unit.bus_id}, node ${unit.node_id}, rail ${unit.rail_id}`],
       ["serial", String(unit.serial)],
     ]);
-  }
-
-  /** Moves before an instant, newest first; null: the newest. */
-  async page(before) {
-    const u = this.place;
-    const more = this.history.querySelector(".more");
-    if (more) more.remove();
-    try {
-      const answer = await this.api.ask("history", {unit_id: this.plate.fleet.id[u],
-        limit: kRowsOfPage, ...(before === null ? {} : {until_ns: before})});
-      if (u === this.place) this.addMoves(answer.moves, before === null);
-    } catch (error) {
-      if (u === this.place)
-        this.history.replaceChildren(make("p", {class: "hint"}, `No history: ${error.message}.`));
-    }
-  }
-
-  addMoves(moves, first) {
-    if (first) {
-      this.body = make("tbody");
-      this.history.replaceChildren(make("h3", {}, "Moves, newest first"), moves.length === 0
-        ? make("p", {class: "hint"}, "It has not moved yet.")
-        : make("table", {}, make("thead", {}, make("tr", {}, make("th", {scope: "col"}, "began, UTC"),
-            make("th", {scope: "col"}, "configuration"), make("th", {scope: "col"}, "end"))), this.body));
-    }
-    for (const move of moves)
-      this.body.append(make("tr", {}, make("td", {}, clock(move.began)),
-          make("td", {}, String(move.configuration)), make("td", {}, move.end)));
-    if (moves.length < kRowsOfPage) return;
-    // ISO times have milliseconds; the earlier page ends there.
-    const until_ns = Date.parse(moves.at(-1).began) * 1_000_000;
-    this.history.append(make("button", {type: "button", class: "more",
-      onclick: () => this.page(until_ns)}, "Earlier moves"));
   }
 }

@@ -211,6 +211,19 @@ TEST_F(PageStreamTest, MotionsOfPlansAreForThoseWhoMaySeeThem) {
   EXPECT_THAT(Ask("/preview-motion?plan=7", operator_).ReadToTheEnd(), StartsWith("HTTP/1.1 404"));
 }
 
+TEST_F(PageStreamTest, ThePowerOfAPreviewIsForThoseWhoMayMakeOne) {
+  Serve();
+  EXPECT_THAT(Ask("/preview-power?plan=0", operator_).ReadToTheEnd(), StartsWith("HTTP/1.1 404"));
+  night_.TakePreview(3,
+                     {.rail_limit_W = 120, .rail_W = {{RailId{2}, {101.5}}}, .total_W = {101.5}});
+  EXPECT_THAT(Ask("/preview-power?plan=3", viewer_).ReadToTheEnd(), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(Ask("/preview-power?plan=3", operator_).ReadToTheEnd(),
+              AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("\"rail_limit_W\":120.0"),
+                    HasSubstr("\"rail_W\":{\"2\":[101.5]}")));
+  EXPECT_THAT(Ask("/preview-power?plan=4", operator_).ReadToTheEnd(), StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(Ask("/preview-power", operator_).ReadToTheEnd(), StartsWith("HTTP/1.1 400"));
+}
+
 TEST_F(PageStreamTest, CurvesAreThoseSinceAnInstant) {
   Serve();
   EXPECT_THAT(Ask("/curves", "").ReadToTheEnd(), StartsWith("HTTP/1.1 401"));

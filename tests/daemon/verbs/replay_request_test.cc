@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/status/history_json.h"
 #include "daemon/store/store.h"
 #include "tests/daemon/verbs/small_fleet.h"
 #include "tests/support/scratch_folder.h"
@@ -157,6 +158,28 @@ TEST_F(ReplayRequest, ErrorsAreThoseOfItsOwnLastExposure) {
   EXPECT_EQ(errors["error_um"], Json({7.0}));
   EXPECT_EQ(Ask({{"configuration", 2}})["errors"]["exposure"], 0) << "it was never measured";
   EXPECT_EQ(Ask({{"configuration", 3}})["errors"]["error_um"], Json({30.0}));
+}
+
+TEST_F(ReplayRequest, AUnitIsFoundInTheExposuresOfOneConfiguration) {
+  for (std::uint64_t id = 1; id <= 3; ++id) Move(id, 1, After(static_cast<std::int64_t>(id) * 100));
+  Measure(1, 5, 50);
+  Measure(2, 6, 40);
+  Measure(2, 8, 7);
+  Measure(3, 9, 30);
+  const auto reader = StoreReader::Open(scratch_ / "s.db").value();
+  const auto found = [&](std::uint32_t unit, std::uint64_t configuration) {
+    return HistoryJson(reader->MeasurementsOf({unit}, configuration).value());
+  };
+  const Json second = found(1, 2);
+  ASSERT_EQ(second.size(), 2u);
+  EXPECT_EQ(second[0]["exposure"], 8) << "the newest first";
+  EXPECT_EQ(second[0]["error_um"], 7.0);
+  EXPECT_EQ(second[0]["configuration"], 2);
+  EXPECT_EQ(second[0]["status"], "measured");
+  EXPECT_EQ(second[1]["exposure"], 6);
+  EXPECT_EQ(found(1, 3).size(), 1u);
+  EXPECT_TRUE(found(1, 4).empty());
+  EXPECT_TRUE(found(2, 2).empty());
 }
 
 TEST_F(ReplayRequest, AlarmsAreThoseOfItsTime) {
