@@ -29,6 +29,7 @@ struct UnitStatusValue {
   double x_fp_mm = kNoNumber;  // the fibre, where both axes have a single position
   double y_fp_mm = kNoNumber;
   std::array<double, kAxisCount> target_deg{kNoNumber, kNoNumber};
+  double measured_error_um = kNoNumber;  // from its target, as last measured; not on the topic
   MoveId move;
   UnitPhase phase = UnitPhase::kAbsent;
   UnitState reported_state = UnitState::kRest;

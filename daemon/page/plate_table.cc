@@ -55,7 +55,9 @@ PlateUnit PlateTable::CodeOf(PositionerIndex i, const UnitStatusValue& status) c
                  .outcome = static_cast<std::uint8_t>(status.outcome),
                  .flags = static_cast<std::uint8_t>((status.enabled ? 1 : 0) |
                                                     (static_cast<int>(status.fault) << 1))};
-  if (witness >= Witness::kReported && code.target_theta != kNoCode) {
+  if (std::isfinite(status.measured_error_um)) {
+    code.error = ErrorCode16(1e-3 * status.measured_error_um);
+  } else if (witness >= Witness::kReported && code.target_theta != kNoCode) {
     const PointFp stands = FibreAt(unit, place);
     const PointFp wanted = FibreAt(unit, target);
     code.error = ErrorCode16(std::hypot(stands.x_mm - wanted.x_mm, stands.y_mm - wanted.y_mm));

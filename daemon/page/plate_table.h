@@ -27,7 +27,7 @@ struct PlateUnit {
   std::uint16_t phi = kNoCode;    // against theta
   std::uint16_t target_theta = kNoCode;
   std::uint16_t target_phi = kNoCode;
-  std::uint16_t error = kNoCode;  // from place to target, 0.5 um; where the unit stands
+  std::uint16_t error = kNoCode;  // from target, 0.5 um: as measured, else by its place
   std::uint8_t phase = 0;         // UnitPhase
   std::uint8_t witness = 0;       // Witness, the lesser of both axes
   std::uint8_t outcome = 0;       // TargetOutcome

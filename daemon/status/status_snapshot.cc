@@ -34,6 +34,7 @@ UnitStatusValue SnapshotUnit(const FleetView& view, PositionerIndex i) {
     value.x_fp_mm = fibre.x_mm;
     value.y_fp_mm = fibre.y_mm;
   }
+  if (seen.error_um) value.measured_error_um = *seen.error_um;
   value.move = seen.move;
   value.phase = seen.phase;
   value.reported_state = seen.reported_state;

@@ -7,6 +7,8 @@ const kMeasured_ms = 12_000;
 const kSettled_ms = 10_000;  // the browser itself works on for a while after a page has come
 const kAtRest_ms = 30_000;
 const kTicksPerSecond = 100;
+const kMoving = 3;       // colours.js, State
+const kBegun_ms = 1000;  // the start comes a moment after the signal
 
 /** CPU of this program's children and theirs: the browser. Units: s. */
 function browserCpu_s() {
@@ -93,8 +95,10 @@ await withBrowser(async (browser) => {
   await measure(tab, "a preview plays");
   await tab.click("#player-close");
   await tab.click("#apply");
-  await tab.waitForFunction((count) => window.focalfleetPage.plate.turning.size > 0.5 * count,
-      given.count);
+  await tab.waitForFunction(([count, moving]) =>
+    window.focalfleetPage.plate.state.filter((state) => state === moving).length > 0.5 * count,
+      [given.count, kMoving]);
+  await tab.waitForTimeout(kBegun_ms);
   await measure(tab, "all move");
   console.log(await textOf(tab, "#progress-text", /./));
   if (tab.faults.length > 0) console.log(tab.faults);

@@ -98,15 +98,19 @@ export class Film {
   /** Angles and states are those of the instant. */
   seek(t_s) {
     this.t_s = t_s;
-    for (let u = 0; u < this.count; ++u) {
-      if (this.pieces[0].first[u + 1] > this.pieces[0].first[u]) {
-        this.theta[u] = this.angleAt(0, u, t_s);
-        this.phi[u] = this.angleAt(1, u, t_s);
-      }
-      const at = this.spans.lastBegun(u, t_s);
-      this.state[u] = at < 0 ? this.restState[u]
-        : t_s < this.spans.values[at + 1] ? State.moving : this.spans.values[at + 2];
+    for (let u = 0; u < this.count; ++u) this.update(u);
+  }
+
+  /** The unit's angles and state are those of `t_s`. */
+  update(u) {
+    const {t_s} = this;
+    if (this.pieces[0].first[u + 1] > this.pieces[0].first[u]) {
+      this.theta[u] = this.angleAt(0, u, t_s);
+      this.phi[u] = this.angleAt(1, u, t_s);
     }
+    const at = this.spans.lastBegun(u, t_s);
+    this.state[u] = at < 0 ? this.restState[u]
+      : t_s < this.spans.values[at + 1] ? State.moving : this.spans.values[at + 2];
   }
 }
 

@@ -43,6 +43,7 @@ export class Plate {
     this.marked = [];  // units that a preview does not serve
     this.ways = null;  // of the configuration under way
     this.film = null;  // shown in place of the live fleet
+    this.isPlayed = false;  // it goes on
     this.isStale = true;
     this.times_ms = [];  // of drawing, the newest last
     this.isAsked = false;
@@ -96,12 +97,43 @@ export class Plate {
     this.placeAll();
   }
 
-  /** The film stands at another instant. */
+  /** The film stands at another instant: all of it is shown at once. */
   placeFilm() {
-    const {theta, phi} = this.film;
-    for (let u = 0; u < this.fleet.count; ++u) this.place(u, theta[u], phi[u]);
+    this.isPlayed = false;
+    this.film.seek(this.film.t_s);
+    for (let u = 0; u < this.fleet.count; ++u) this.placeOfFilm(u);
     this.reindex();
     this.dirty = true;
+  }
+
+  /** The film goes on: far away the next band of it is shown. */
+  playFilm() {
+    this.isPlayed = true;
+    this.bandsDue = Math.max(1, this.bandsDue);
+    this.ask();
+  }
+
+  /** The counts of the legend are those of the film's instant. */
+  countFilm() {
+    this.film.seek(this.film.t_s);
+    this.reindex();
+  }
+
+  placeOfFilm(u) {
+    const {theta, phi} = this.film;
+    this.place(u, theta[u], phi[u]);
+  }
+
+  /** Units of a band are where the film has them at its instant. */
+  showFilm({low_mm, high_mm}) {
+    const {film, fleet, theme} = this;
+    for (let u = 0; u < fleet.count; ++u) {
+      if (fleet.y_mm[u] > high_mm || fleet.y_mm[u] < low_mm) continue;
+      film.update(u);
+      this.placeOfFilm(u);
+      this.state[u] = film.state[u];
+      this.index[u] = theme.indexOf(u);
+    }
   }
 
   // ---- motion
@@ -188,6 +220,7 @@ export class Plate {
     const isWhole = this.isDirty || !isFar;
     const band = isWhole ? this.far.wholeBand() : this.far.nextBand();
     this.turning.show(now_ms, isWhole ? kEverywhere : band, this.placed);
+    if (this.film && this.isPlayed) this.showFilm(isWhole ? kEverywhere : band);
     this.dirty = false;
     this.bandsDue = isWhole ? 0 : Math.max(0, this.bandsDue - 1);
     // Beside a border an arm may have been drawn for two instants.

@@ -3,6 +3,7 @@
 import {duration, find, make, setText} from "/page/dom.js";
 
 const kLegend_ms = 300;
+const kSpeedOfBands = 4;  // of a faster one an arm would be torn between two bands
 
 export class Player {
   /** `onChange()`: the plate shows something else now; `onLegend()`: its counts have changed. */
@@ -59,6 +60,7 @@ export class Player {
 
   pause() {
     this.isPlaying = false;
+    if (this.plate.isPlayed) this.plate.placeFilm();  // its bands are not of the same instant
     setText(find("player-play"), "Play");
   }
 
@@ -79,9 +81,12 @@ export class Player {
   }
 
   seek(t_s) {
-    const {film} = this;
-    film.seek(t_s);
-    this.plate.placeFilm();
+    const {film, plate} = this;
+    film.t_s = t_s;
+    const goesOn = this.isPlaying && t_s < film.end_s &&
+        Number(find("player-speed").value) <= kSpeedOfBands;
+    if (goesOn) plate.playFilm();
+    else plate.placeFilm();
     const slider = find("player-time");
     const share = Math.round(1000 * (t_s - film.begin_s) / (film.end_s - film.begin_s));
     if (Number(slider.value) !== share) slider.value = String(share);
@@ -91,6 +96,7 @@ export class Player {
     const now_ms = performance.now();
     if (!this.isPlaying || now_ms > this.legendAt_ms || t_s >= film.end_s) {
       this.legendAt_ms = now_ms + kLegend_ms;
+      if (goesOn) plate.countFilm();
       this.onLegend();
     }
   }

@@ -6,7 +6,7 @@
 
 const kFullCircle = 2 * Math.PI;
 const kGapsOfTurn = 2;
-const kGapLongest_ms = 400;  // after a longer one arms are shown where they are
+const kGapLongest_ms = 700;  // after a longer one arms are shown where they are
 const kGapsKept = 9;
 
 /** The shortest way from one angle to another. */

@@ -66,6 +66,12 @@ TEST_F(PlateTableTest, TheErrorIsTheDistanceFromTheTarget) {
   EXPECT_EQ(Taken().target_theta, kNoCode);
 }
 
+TEST_F(PlateTableTest, AMeasuredErrorGoesBeforeThatOfThePlace) {
+  status_.low_deg = status_.high_deg = {30.1, 80};
+  status_.measured_error_um = 8.9;
+  EXPECT_NEAR(Taken().error / 2.0, 8.9, 0.26);
+}
+
 TEST_F(PlateTableTest, TheLesserWitnessCounts) {
   status_.witness = {Witness::kMeasured, Witness::kInterval};
   status_.low_deg = {30, 40};
