@@ -6,6 +6,9 @@ export const kWitnesses = ["unknown", "interval", "predicted", "reported", "meas
 export const kOutcomes = ["none", "pending", "arrived", "refused", "failed", "stopped",
   "unmeasured"];
 
+/** Phases in which motors turn. */
+const kTurning = new Set(["moving", "homing"].map((name) => kPhases.indexOf(name)));
+
 const kNoCode = 0xFFFF;
 const kRadiansPerStep = 2 * Math.PI / 65535;
 const kHeadBytes = 44;
@@ -125,7 +128,6 @@ export class Fleet {
       this.takeAngles(view, u, from);
       this.changed_ms[u] = now_ms;
     });
-    if (snapshot) this.motors.fill(0);  // the time since the frame before is not known
     return {snapshot, facts: isNew};
   }
 
@@ -151,9 +153,9 @@ export class Fleet {
     this.phi[u] = phi;
   }
 
-  /** How many motors of the unit turned with the newest frame. */
+  /** How many motors of the unit turned with the newest frame, where it is on its way. */
   motorsOf(u) {
-    return this.changed_ms[u] === this.received_ms ? this.motors[u] : 0;
+    return kTurning.has(this.phase[u]) && this.changed_ms[u] === this.received_ms ? this.motors[u] : 0;
   }
 
   takeState(view, u, from) {
