@@ -25,9 +25,11 @@ void ListModeThreshold(const CampaignFacts& facts, Templates* out) {
            out);
   const FilledColumn* mode = facts.Find(kMode);
   if (mode == nullptr || !mode->varies()) return;
-  for (int k = 0; k < static_cast<int>(std::size(kDriveModes)); ++k) {
+  for (std::size_t k = 0; k < kDriveModes.size(); ++k) {
     const std::size_t begin = out->size();
-    ListGrid({.memories = {Memory::kHold, Memory::kNow, Memory::kChain}, .form = kOfMode + k}, out);
+    ListGrid({.memories = {Memory::kHold, Memory::kNow, Memory::kChain},
+              .form = kOfMode + static_cast<int>(k)},
+             out);
     for (std::size_t t = begin; t < out->size(); ++t)
       (*out)[t].label += "; along the motion in mode " + std::string(kDriveModes[k]);
   }
