@@ -58,8 +58,8 @@ struct CampaignFacts {
   std::vector<double> step_deg[2];  // Shape: (rows): as commanded, wraps of whole turns undone
   // Shape: (units): indices of the units that are near enough for their motors to pull.
   std::vector<std::vector<std::size_t>> pulling;
-  // By unit_id, deg: where the rotors stand at motor angles of 0, as the pull of their neighbours
-  // shows it (diagnosis/rotor_phases.h). Empty where it is not known.
+  // Where rotors stand at motor angles of 0, deg, by unit_id, as the pull of their neighbours shows
+  // it (diagnosis/rotor_phases.h). Empty where that is not known.
   std::map<std::uint32_t, double> rotor_phase_deg[2];
   double radius_mm = 0;     // of the plate: farthest base from the frame's origin; at least 1
   double pitch_mm = 0;      // median distance to the nearest base; 0 with one unit
