@@ -186,6 +186,24 @@ TEST(BusyHost, OtherHardwareHasAnotherClock) {
   EXPECT_EQ(fleet.coordinator().unit({2}).clock.readings, 1u);
 }
 
+// A unit that missed the first signal would begin out of step with all others.
+TEST(BusyHost, AStartIsNotSaidAgainAfterItsInstant) {
+  InProcessFleet fleet({.count = 14, .units_per_bus = 7, .seed = TestSeed(89)});
+  fleet.Run(Seconds(5));
+  fleet.ApplyRandom(TestSeed(89));
+  std::vector<OutFrame> sent;
+  fleet.sent = &sent;
+  const auto says_start = [](const OutFrame& frame) {
+    return (frame.frame.id >> 20 & 0x3f) == static_cast<std::uint32_t>(Function::kStart);
+  };
+  ASSERT_TRUE(fleet.RunUntil([&] { return std::ranges::any_of(sent, says_start); }, Seconds(60)));
+  fleet.Freeze(Seconds(2), InProcessFleet::Heard::kWaits);
+  sent.clear();
+  fleet.Run(Seconds(2));
+  EXPECT_GT(sent.size(), 0u);
+  EXPECT_EQ(std::ranges::count_if(sent, says_start), 0);
+}
+
 // Frames that arrived while the host was held up before reading the socket do not count for the
 // second that ended before.
 TEST(BusyHost, ABusIsNotBusierThanItCanBe) {
