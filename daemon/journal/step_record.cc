@@ -111,6 +111,7 @@ std::string RecordOf(const Inputs& inputs, const Effects& effects) {
 
 Replayer::Replayer(Start start)
     : layout_(start.layout),
+      plan_limits_(start.plan_limits),
       coordinator_(std::make_unique<Coordinator>(start.layout, std::move(start.drives),
                                                  start.config, std::move(start.stored))) {}
 Replayer::~Replayer() = default;
@@ -150,7 +151,9 @@ Status Replayer::Step(std::string_view record) {
   now_ = inputs.now;
   if (effects_.plan_job) {
     const auto drives = coordinator_->drives();
-    jobs_[effects_.plan_job->job] = {*effects_.plan_job, {drives.begin(), drives.end()}};
+    GivenJob given{*effects_.plan_job, {drives.begin(), drives.end()}};
+    if (plan_limits_.any()) given.job.options.power = plan_limits_;
+    jobs_[effects_.plan_job->job] = std::move(given);
   }
   const std::pair<const char*, bool> parts[] = {{"rows", now.rows != recorded.rows},
                                                 {"frames", now.frames != recorded.frames},

@@ -29,6 +29,7 @@ class Replayer {
     std::vector<UnitDrive> drives;
     CoordinatorConfig config;
     StoredFleet stored;
+    PowerLimits plan_limits;  // that the planner kept; none in the daemon
   };
   explicit Replayer(Start start);
   ~Replayer();
@@ -46,6 +47,7 @@ class Replayer {
     std::vector<UnitDrive> drives;
   };
   const Layout* layout_;
+  PowerLimits plan_limits_;
   std::unique_ptr<Coordinator> coordinator_;
   std::map<std::uint64_t, GivenJob> jobs_;  // that have no answer yet
   Effects effects_;

@@ -20,6 +20,10 @@ FaultSite KillOf(TurnPoint point) {
   return static_cast<FaultSite>(Index(kKillGathered) + static_cast<std::size_t>(point));
 }
 
+PowerLimits PlanLimits(const Draws& draws) {
+  return {.rail_W = draws.rail_motors * MotorAsMeasured_W()};
+}
+
 }  // namespace
 
 Night::Night(const Draws& draws, const NightOptions& options)
@@ -89,7 +93,7 @@ Surroundings Night::Around() {
     return draws_.plan;
   };
   around.planner_fails = [this] { return faults_->Happens(kPlannerFails, 50); };
-  around.plan_limits = {.rail_W = draws_.rail_motors * MotorAsMeasured_W()};
+  around.plan_limits = PlanLimits(draws_);
   around.planner_has_room = [this] { return !faults_->Happens(kPlannerFull, 50); };
   around.reader_fails = [this] { return faults_->Happens(kStoreReaderFails, 20); };
   around.publisher_has_room = [this] { return !faults_->Happens(kReaderBehind, 20); };
@@ -102,8 +106,8 @@ Surroundings Night::Around() {
   around.starts = [this](const StoredFleet& stored, const CoordinatorConfig& config) {
     replayer_.reset();
     if (options_.replay)
-      replayer_ = std::make_unique<journal::Replayer>(
-          journal::Replayer::Start{&plant_->layout(), plant_->drives(), config, stored});
+      replayer_ = std::make_unique<journal::Replayer>(journal::Replayer::Start{
+          &plant_->layout(), plant_->drives(), config, stored, PlanLimits(draws_)});
   };
   around.stepped = [this](const Inputs& inputs, const Effects& effects) {
     if (replayer_ == nullptr) return;
