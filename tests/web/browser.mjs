@@ -8,6 +8,9 @@ const given = JSON.parse(process.argv[2]);
 const require = createRequire(`${given.nodeFolder}/`);
 const {chromium} = require("playwright-core");
 const kPatience_ms = 60_000;  // limit for a hang; nothing is timed
+const kLoads = 5;
+export const kMoving = 3;     // colours.js, State
+const kBegun_ms = 300;        // the start comes 0.25 s of the fleet's time after the signal
 
 const answers = createInterface({input: process.stdin})[Symbol.asyncIterator]();
 
@@ -49,6 +52,12 @@ export async function openTab(browser, options = {}) {
       tab.faults.push(`it asks another host: ${request.url()}`);
   });
   await tab.goto(given.url);
+  // The daemon ends a connection that is silent for 1 s: on a busy machine the browser may be late,
+  // and a person loads the page again.
+  for (let k = 0; k < kLoads && tab.losses.length > 0; ++k) {
+    tab.losses = [];
+    await tab.reload();
+  }
   return tab;
 }
 
@@ -81,11 +90,23 @@ export async function textOf(tab, selector, pattern) {
   return found.innerText();
 }
 
-/** Units have begun to move: their start comes 0.25 s of the fleet's time after the signal. */
+/** Units have begun to move. */
 export async function untilTheyMove(tab) {
   await textOf(tab, "#fleet-summary", /moving/);
   await tab.waitForFunction(() => window.focalfleetPage.plate.turning.size > 20);
-  await tab.waitForTimeout(300);
+  await tab.waitForTimeout(kBegun_ms);
+}
+
+/** The page itself presses stop once units move: on a busy machine a step from here is late. */
+export async function armStop(tab) {
+  await tab.evaluate(([moving, begun_ms]) => {
+    const {plate} = window.focalfleetPage;
+    const watch = setInterval(() => {
+      if (!plate.state.includes(moving) || plate.turning.size <= 20) return;
+      clearInterval(watch);
+      setTimeout(() => document.getElementById("stop").click(), begun_ms);
+    }, 20);
+  }, [kMoving, kBegun_ms]);
 }
 
 /** The file is dropped onto the page, as from a folder. */

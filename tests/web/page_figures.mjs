@@ -1,13 +1,13 @@
 // Frame times of the page while all units move, in the browser's own count.
 
 import {readdirSync, readFileSync} from "node:fs";
-import {dropFile, given, isLive, openTab, signIn, textOf, withBrowser} from "./browser.mjs";
+import {dropFile, given, isLive, kMoving, openTab, signIn, textOf, withBrowser} from
+  "./browser.mjs";
 
 const kMeasured_ms = 12_000;
 const kSettled_ms = 10_000;  // the browser itself works on for a while after a page has come
 const kAtRest_ms = 30_000;
 const kTicksPerSecond = 100;
-const kMoving = 3;       // colours.js, State
 const kBegun_ms = 1000;  // the start comes a moment after the signal
 
 /** CPU of this program's children and theirs: the browser. Units: s. */

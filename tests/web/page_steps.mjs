@@ -1,14 +1,13 @@
 // The scenarios of page_test.py.
 
 import {readFileSync} from "node:fs";
-import {assert, axeFindings, coloursOf, dropFile, given, isLive, openTab, signIn, textOf,
-  withBrowser, world} from "./browser.mjs";
+import {armStop, assert, axeFindings, coloursOf, dropFile, given, isLive, kMoving, openTab, signIn,
+  textOf, withBrowser, world} from "./browser.mjs";
 import {heap} from "./heap_steps.mjs";
 import {past, study, tabs} from "./past_steps.mjs";
 import {tasks} from "./task_steps.mjs";
 
 const targets = () => readFileSync(given.targets, "utf8");
-const kMoving = 3;  // colours.js, State
 const say = (text) => process.stdout.write(`${text}\n`);
 
 /** Verbs that the tab sent, oldest first. */
@@ -101,14 +100,7 @@ async function night(browser) {
   say("a stop during motion");
   await world("targets 7");
   await dropFile(tab, "night-2.csv", targets());
-  await tab.evaluate((moving) => {  // pressed as soon as units are seen to move, which is brief
-    const {plate} = window.focalfleetPage;
-    const watch = setInterval(() => {
-      if (!plate.state.includes(moving)) return;
-      clearInterval(watch);
-      document.getElementById("stop").click();
-    }, 20);
-  }, kMoving);
+  await armStop(tab);
   await tab.click("#apply");
   await textOf(tab, "#configuration", /night-2.csv .*is stopped/);
   await tab.screenshot({path: `${given.out}/stopped.png`});

@@ -1,8 +1,8 @@
 // Scenarios of page_test.py about plans before they are applied, and configurations that are over.
 
 import {readFileSync} from "node:fs";
-import {assert, axeFindings, coloursOf, dropFile, given, isLive, openTab, signIn, textOf,
-  untilTheyMove, world} from "./browser.mjs";
+import {armStop, assert, axeFindings, coloursOf, dropFile, given, isLive, openTab, signIn, textOf,
+  world} from "./browser.mjs";
 
 const targets = () => readFileSync(given.targets, "utf8");
 const say = (text) => process.stdout.write(`${text}\n`);
@@ -67,9 +67,8 @@ export async function past(browser) {
 
   say("a second one is stopped on its way");
   await world("targets 7");
+  await armStop(tab);
   await apply(tab, "night-2.csv");
-  await untilTheyMove(tab);
-  await tab.click("#stop");
   await textOf(tab, "#configuration", /night-2.csv \(configuration 2\) is stopped/);
   await textOf(tab, "#fleet-summary", `${given.count} ready`);  // all have said where they stand
   await tab.waitForFunction(() => window.focalfleetPage.plate.turning.size === 0);
