@@ -24,14 +24,16 @@ import {UnitPanel} from "/page/unit.js";
 import {Ways} from "/page/ways.js";
 
 const kStale_ms = 2500;  // status comes each second at least
+const kFresh_ms = 2000;  // ages below it are one text
+const kLook_ms = 500;    // at an age or a legend that changes
 const kLegend_ms = 500;
 
 /**
  * An age in whole seconds: a text that changes all the time is neither calm nor cheap. Status comes
- * each second at rest, so that ages below two seconds are one text.
+ * each second at rest.
  */
 function inWords(age_ms) {
-  return age_ms < 2000 ? "less than 2 s" : duration(Math.floor(age_ms / 1000)).replace(".0", "");
+  return age_ms < kFresh_ms ? "less than 2 s" : duration(Math.floor(age_ms / 1000)).replace(".0", "");
 }
 
 class Page {
@@ -46,7 +48,8 @@ class Page {
     this.linkText = "";
     this.legendAt_ms = 0;
     this.isLegendOld = false;
-    setInterval(() => this.showAge(), 500);
+    this.ageTimer = 0;
+    this.showAge();
   }
 
   async begin() {
@@ -215,7 +218,7 @@ class Page {
     set(stale, "hidden", live);
     if (!live) setText(stale, age_ms === Infinity ? this.linkText || "Waiting for the daemon."
       : `Old: the plate as it was ${inWords(age_ms)} ago. ${this.linkText}`);
-    if (!this.plate) return;
+    if (!this.plate) return this.lookAgain(age_ms, true);
     if (this.plate.isStale !== !live) {
       this.plate.isStale = !live;
       this.plate.dirty = true;
@@ -223,6 +226,14 @@ class Page {
     const isByAge = find("theme").value === "age";
     if (isByAge && now_ms > this.legendAt_ms) this.plate.reindex();
     if ((this.isLegendOld || isByAge) && now_ms > this.legendAt_ms) this.renewLegend(now_ms);
+    this.lookAgain(age_ms, this.isLegendOld || isByAge);
+  }
+
+  /** At rest each frame says the age anew, and only a frame that does not come needs a timer. */
+  lookAgain(age_ms, isChanging) {
+    clearTimeout(this.ageTimer);
+    const wait_ms = isChanging ? kLook_ms : Math.max(kLook_ms, kFresh_ms - age_ms);
+    this.ageTimer = setTimeout(() => this.showAge(), wait_ms);
   }
 
   showFacts() {
