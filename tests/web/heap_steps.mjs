@@ -10,8 +10,9 @@ const kFramesOfHour = 36_000;  // ten a second
 const kHours = Number(process.env.FOCALFLEET_HEAP_HOURS ?? 8);
 const kSamplesOfHour = 2;
 const kWarmSamples = 2;        // code is compiled and lists reach their lengths
-const kGrowthMost = 1.02;      // from the first half of the night to the second
-const kGrowthMost_MB = 0.5;    // a list that is open may be longer
+// A page that keeps anything of each frame keeps a pointer of it at least.
+const kKeptOfFrame_bytes = 8;
+const kKeptOfRound = 0.5;      // nodes and listeners of each configuration
 
 /** Keeps the frames of one configuration, as the daemon sends them; the first is a snapshot. */
 async function record(tab) {
@@ -108,14 +109,19 @@ export async function heap(browser) {
   }
   console.log(JSON.stringify({units: given.count, recorded_frames: recorded,
     played_frames: kHours * kFramesOfHour}));
+  // The median of the slopes of all pairs (Theil and Sen): garbage that the browser frees late, and
+  // lists of other lengths, scatter the samples.
   const warm = samples.slice(Math.min(kWarmSamples, samples.length - 2));
-  const half = warm.length >> 1;
-  for (const what of ["MB", "nodes", "listeners"]) {
-    // The browser frees some things later than others: what is held for good is in the least sample.
-    const [early, late] = [warm.slice(0, half + 1), warm.slice(half)].map((part) =>
-      Math.min(...part.map((sample) => sample[what])));
-    const allowed = kGrowthMost * early + (what === "MB" ? kGrowthMost_MB : 20);
-    assert.ok(late <= allowed, `${what} grew from ${early} to ${late}`);
+  const rounds = kHours * kFramesOfHour / recorded;
+  const most = {MB: kKeptOfFrame_bytes * kHours * kFramesOfHour / 1e6, nodes: kKeptOfRound * rounds,
+    listeners: kKeptOfRound * rounds};
+  for (const [what, allowed] of Object.entries(most)) {
+    const slopes = warm.flatMap((early, k) => warm.slice(k + 1).map((late, n) =>
+      (late[what] - early[what]) / (n + 1)));
+    slopes.sort((a, b) => a - b);
+    const grown = slopes[slopes.length >> 1] * kHours * kSamplesOfHour;
+    console.log(JSON.stringify({what, grown: Number(grown.toFixed(2)), allowed}));
+    assert.ok(grown <= allowed, `${what} grew by ${grown} in ${kHours} hours`);
   }
   assert.deepEqual(tab.faults, []);
 }
