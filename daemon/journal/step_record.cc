@@ -15,6 +15,7 @@ namespace {
 struct RecordedPlan {
   std::uint64_t job = 0;
   std::optional<Error> error;
+  std::uint64_t given_up_at_look = 0;
 };
 
 /// Inputs that own what they name.
@@ -97,7 +98,7 @@ std::string RecordOf(const Inputs& inputs, const Effects& effects) {
                        .store_failing = inputs.store_failing,
                        .refused = Owned(inputs.refused)};
   for (const PlanDone& plan : inputs.plans) {
-    owned.plans.push_back({plan.job, {}});
+    owned.plans.push_back({plan.job, {}, plan.given_up_at_look});
     if (plan.late && !*plan.late)
       owned.plans.back().error = plan.late->error();
     else if (!plan.plan)
@@ -130,8 +131,14 @@ Status Replayer::Step(std::string_view record) {
     if (job == jobs_.end())
       return Fail(ErrorCode::kInvalid,
                   fmt::format("record {} has the answer to a job that nobody gave", steps_ + 1));
-    plans.push_back(plan.error ? PlanFailed(job->second.job, *plan.error)
-                               : RunPlanJob(job->second.job, *layout_, job->second.drives));
+    Abandoned given_up;
+    if (plan.given_up_at_look != 0)
+      given_up = [look = std::uint64_t{0}, last = plan.given_up_at_look]() mutable {
+        return ++look >= last;
+      };
+    plans.push_back(plan.error
+                        ? PlanFailed(job->second.job, *plan.error)
+                        : RunPlanJob(job->second.job, *layout_, job->second.drives, given_up));
     jobs_.erase(job);
   }
   effects_.Clear();

@@ -1,6 +1,7 @@
 // A record of one step of the coordinator: all that it took in, and a digest of what it decided. A
 // coordinator that starts from the same state and takes the recorded inputs must decide the same,
-// to the bit. Plans are not recorded: the planner makes the same one of the same job.
+// to the bit. Plans are not recorded: the planner makes the same one of the same job, given up at
+// the same look where the search was cut short.
 #pragma once
 
 #include <cstdint>

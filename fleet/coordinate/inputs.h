@@ -44,6 +44,9 @@ struct PlanDone {
   /// The basis of late moves within this plan; null unless the plan is for a configuration.
   std::shared_ptr<const RunningPlan> running;
   std::optional<Result<LateMove>> late;  // of a job for a late move; `plan` is empty then
+  /// The search was given up when it asked for this time; 0: never. A plan that was complete by
+  /// then stays, and the same number makes it again.
+  std::uint64_t given_up_at_look = 0;
 };
 
 /// The answer to an ExposureJob.

@@ -1,6 +1,7 @@
 #include "fleet/plan/job.h"
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -92,6 +93,13 @@ PlanDone PlanOf(const PlanJob& job, const PlanRequest& request, const Abandoned&
 
 PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives,
                     const Abandoned& abandoned) {
+  std::uint64_t looks = 0;
+  std::uint64_t given_up_at_look = 0;
+  const auto counted = [&] {
+    ++looks;
+    if (given_up_at_look == 0 && abandoned()) given_up_at_look = looks;
+    return given_up_at_look != 0;
+  };
   if (job.late) return PlanLateMove(job, layout, drives);
   const PlanRequest request{.layout = &layout,
                             .drives = drives,
@@ -99,7 +107,8 @@ PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const Un
                             .targets = job.targets,
                             .frozen = job.frozen,
                             .offsets = job.offsets};
-  PlanDone done = PlanOf(job, request, abandoned);
+  PlanDone done = PlanOf(job, request, abandoned ? Abandoned(std::cref(counted)) : Abandoned());
+  done.given_up_at_look = given_up_at_look;
   if (done.plan) {
     const PlanEstimate estimate = Estimate(*done.plan, layout, drives, MotorModel{});
     done.predicted = {estimate.makespan_s, estimate.energy_J, estimate.peak_power_W};

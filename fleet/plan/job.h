@@ -15,7 +15,7 @@ namespace focalfleet {
 /// way for it.
 /// - A late move in a configuration that is under way. Its predicted makespan is its end, counted
 /// from the configuration's start signal.
-/// An abandoned job ends soon, with kUnavailable for a plan.
+/// An abandoned job ends soon, with kUnavailable where there is no plan yet.
 PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives,
                     const Abandoned& abandoned = {});
 

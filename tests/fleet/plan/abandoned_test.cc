@@ -107,5 +107,36 @@ TEST(Abandoned, AJobReportsItAndItsRunningPlanIsKeptWithoutTheQuestion) {
   EXPECT_EQ(asked.times, before);
 }
 
+/// A search that is cut short while it improves its plan ends with another plan than one that is
+/// not, and a journal makes it again.
+TEST(Abandoned, APlanThatWasCutShortIsMadeAgainByItsLook) {
+  std::size_t later = 0;
+  for (const std::uint64_t seed : {0u, 1u, 2u}) {
+    PlanningFleet fleet = FleetOf(MakeHexLayout(SdssLike(37)));
+    DrawStartAndTargets(&fleet, Seed(seed));
+    const PlanJob job{.job = 7,
+                      .start = fleet.start,
+                      .targets = fleet.targets,
+                      .frozen = fleet.frozen,
+                      .options = {}};
+    Asked uncut;
+    const PlanDone whole = RunPlanJob(job, fleet.layout, fleet.drives, uncut.question());
+    ASSERT_TRUE(whole.plan);
+    EXPECT_EQ(whole.given_up_at_look, 0u);
+    for (std::size_t percent = 10; percent < 100; percent += 10) {
+      Asked cut{.wanted_for = uncut.times * percent / 100};
+      const PlanDone first = RunPlanJob(job, fleet.layout, fleet.drives, cut.question());
+      EXPECT_EQ(first.given_up_at_look, *cut.wanted_for + 1);
+      Asked again{.wanted_for = first.given_up_at_look - 1};
+      const PlanDone second = RunPlanJob(job, fleet.layout, fleet.drives, again.question());
+      ASSERT_EQ(first.plan.has_value(), second.plan.has_value()) << percent;
+      if (!first.plan) continue;
+      ExpectSamePlan(*first.plan, *second.plan);
+      later += first.plan->makespan_s > whole.plan->makespan_s ? 1u : 0u;
+    }
+  }
+  EXPECT_GT(later, 0u) << "no cut came while a plan was improved";
+}
+
 }  // namespace
 }  // namespace focalfleet
