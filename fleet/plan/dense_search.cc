@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "fleet/plan/joint_search.h"
@@ -13,6 +14,7 @@
 #include "fleet/plan/pair_search.h"
 #include "fleet/plan/soft_search.h"
 #include "fleet/plan/step_questions.h"
+#include "fleet/plan/unit_ways.h"
 #include "protocol/base/rng.h"
 
 namespace focalfleet {
@@ -40,6 +42,17 @@ constexpr double kWordCost_s = 2e-9;
 constexpr double kReplanCost_s = 350e-6;
 constexpr double kJointStepCost_s = 0.8e-6;
 
+/// The motion of a unit before it was planned anew.
+struct Before {
+  std::uint32_t unit = 0;
+  AxisPaths path;
+};
+
+bool IsAmong(std::span<const Before> units, std::uint32_t unit) {
+  return std::any_of(units.begin(), units.end(),
+                     [&](const Before& before) { return before.unit == unit; });
+}
+
 class DenseSearch {
  public:
   DenseSearch(const LocalSearchRequest& request, const DenseSearchOptions& options)
@@ -48,6 +61,8 @@ class DenseSearch {
         scene_(*request.scene),
         rng_(Rng::Stream(request.seed, "dense")),
         motions_(request),
+        ways_(&motions_, &rng_),
+        is_between_(scene_.size(), 0),
         questions_(&motions_),
         end_step_(std::min(questions_.steps().count - 1,
                            static_cast<std::int32_t>(std::ceil(options.within * request.within_s /
@@ -58,16 +73,12 @@ class DenseSearch {
 
  private:
   using Pair = std::pair<std::uint32_t, std::uint32_t>;
-  struct Before {
-    std::uint32_t unit = 0;
-    AxisPaths path;
-  };
-
   void Begin();
   bool MayPlan(std::uint32_t unit) const {
     return q_.movable[unit] != 0 && !motions_.IsGiven(unit) && scene_.is_place(unit);
   }
   bool Replan(std::uint32_t unit);
+  bool ReplanBetween(std::uint32_t unit);
   bool ReplanTogether(std::span<const std::uint32_t> units, bool thoroughly);
   bool Take(std::span<const std::uint32_t> units, std::span<const AxisPaths> paths);
   void Set(std::uint32_t unit, const AxisPaths& path) {
@@ -79,7 +90,6 @@ class DenseSearch {
     questions_.Forget(unit);
   }
   bool Choose(std::uint32_t unit);
-  [[nodiscard]] bool IsChosen(std::uint32_t unit) const;
   void ChooseMet(std::size_t first, std::size_t last);
   void PutBack(std::span<const Before> before);
   void UpdateConflicts(std::uint32_t unit);
@@ -97,7 +107,10 @@ class DenseSearch {
   [[nodiscard]] double EndOfUnit(std::uint32_t unit) const {
     return MayPlan(unit) && !IsEmpty(motions_.path(unit)) ? motions_.track(unit).end_s() : 0;
   }
-  [[nodiscard]] double End() const;
+  /// The first plan may use its work up; cuts of the time have a limit of their own.
+  [[nodiscard]] bool MayGoOn() const {
+    return !IsAbandoned(q_.abandoned) && (in_cut_ || Work_s() < options_.complete_cpu_s);
+  }
   [[nodiscard]] double Work_s() const {
     return static_cast<double>(search_.work() + pair_search_.work()) * kWordCost_s +
            static_cast<double>(replans_) * kReplanCost_s +
@@ -109,6 +122,8 @@ class DenseSearch {
   const Scene& scene_;
   Rng rng_;
   Motions motions_;
+  UnitWays ways_;
+  std::vector<std::uint8_t> is_between_;  // goes where the grid has no way
   StepQuestions questions_;
   SoftSearch search_;
   JointSearch joint_;
@@ -121,12 +136,6 @@ class DenseSearch {
   bool in_cut_ = false;
   std::uint64_t replans_ = 0;
 };
-
-double DenseSearch::End() const {
-  double end_s = 0;
-  for (std::uint32_t i = 0; i < scene_.size(); ++i) end_s = std::max(end_s, EndOfUnit(i));
-  return end_s;
-}
 
 void DenseSearch::UpdateConflicts(std::uint32_t unit) {
   for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot) {
@@ -145,8 +154,27 @@ bool DenseSearch::Replan(std::uint32_t unit) {
   ++replans_;
   questions_.FindRests({&unit, 1}, end_step_);
   const auto found = search_.Find(questions_.Ask(unit, 0, end_step_));
-  if (!found || !motions_.KeepsLimits(unit, found->paths)) return false;
-  Set(unit, found->paths);
+  if (found && motions_.KeepsLimits(unit, found->paths)) {
+    Set(unit, found->paths);
+    if (!MeetsForGood(unit, &motions_)) return true;
+    TakeOut(unit);
+  }
+  if (in_cut_ && is_between_[unit] == 0) return false;
+  is_between_[unit] = ReplanBetween(unit) ? 1 : 0;
+  return is_between_[unit] != 0;
+}
+
+/// A way between things that never move may be too narrow for the grid. Pre: the unit is taken out.
+bool DenseSearch::ReplanBetween(std::uint32_t unit) {
+  const double within_s = end_step_ * questions_.steps().step_s();
+  std::vector<Candidate> found = ways_.ViaCell(unit, kNoUnitIndex, within_s);
+  AppendAlong(
+      ways_.QuestionFor(unit, within_s),
+      ways_.AmongStanding(unit, q_.from[unit], PoseBox::Of(q_.to[unit]), kNoUnitIndex, q_.from),
+      &found);
+  std::size_t chosen = 0;
+  if (ways_.Cheapest(unit, within_s, found, 0, &chosen) == Motions::kNever) return false;
+  Set(unit, found[chosen].path);
   return !MeetsForGood(unit, &motions_);
 }
 
@@ -243,18 +271,11 @@ void DenseSearch::Begin() {
 }
 
 bool DenseSearch::Choose(std::uint32_t unit) {
-  if (!MayPlan(unit) || IsChosen(unit)) return false;
+  if (!MayPlan(unit) || IsAmong(chosen_, unit)) return false;
   chosen_.push_back({unit, motions_.path(unit)});
-  const bool known = std::any_of(before_cut_.begin(), before_cut_.end(),
-                                 [&](const Before& b) { return b.unit == unit; });
-  if (in_cut_ && !known) before_cut_.push_back(chosen_.back());
+  if (in_cut_ && !IsAmong(before_cut_, unit)) before_cut_.push_back(chosen_.back());
   TakeOut(unit);
   return true;
-}
-
-bool DenseSearch::IsChosen(std::uint32_t unit) const {
-  return std::any_of(chosen_.begin(), chosen_.end(),
-                     [&](const Before& b) { return b.unit == unit; });
 }
 
 /// Chooses the units that these chosen ones meet.
@@ -280,7 +301,7 @@ int DenseSearch::ConflictsOfChosen() {
   for (const Before& b : chosen_) {
     for (std::uint32_t slot = 0; slot < scene_.neighbours(b.unit).size(); ++slot) {
       const std::uint32_t other = scene_.neighbours(b.unit)[slot].unit;
-      if (IsChosen(other) && other < b.unit) continue;
+      if (IsAmong(chosen_, other) && other < b.unit) continue;
       if (motions_.Meet(b.unit, slot)) weight += WeightOf(std::minmax(b.unit, other));
     }
   }
@@ -335,7 +356,7 @@ bool DenseSearch::Repair(const Pair& pair) {
   if (ok) {
     int before = 0;
     for (const Pair& p : conflicts_)
-      if (IsChosen(p.first) || IsChosen(p.second)) before += WeightOf(p);
+      if (IsAmong(chosen_, p.first) || IsAmong(chosen_, p.second)) before += WeightOf(p);
     ok = ConflictsOfChosen() <= before;
   }
   if (!ok) {
@@ -349,7 +370,7 @@ bool DenseSearch::Repair(const Pair& pair) {
 
 /// True: no conflict is left.
 bool DenseSearch::RepairAll(int repairs_most) {
-  for (int n = 0; n < repairs_most && !conflicts_.empty() && !IsAbandoned(q_.abandoned); ++n) {
+  for (int n = 0; n < repairs_most && !conflicts_.empty() && MayGoOn(); ++n) {
     auto it = conflicts_.begin();
     std::advance(it, static_cast<std::ptrdiff_t>(rng_.Below(conflicts_.size())));
     const Pair pair = *it;
@@ -369,7 +390,7 @@ bool DenseSearch::CompleteFirst() {
   for (int tries = 0; tries < kTriesWithMostTime; tries += end_step_ == most ? 1 : 0) {
     const std::size_t before = conflicts_.size();
     if (RepairAll(repairs)) return true;
-    if (IsAbandoned(q_.abandoned)) return false;
+    if (!MayGoOn()) return false;
     // Units without any way keep many others in conflict.
     if (conflicts_.size() > std::max(kHopelessAtLeast, scene_.size() / kHopelessShare) &&
         10 * conflicts_.size() > 9 * before)
@@ -411,7 +432,8 @@ void DenseSearch::Improve() {
   double share = kCutShare;
   const auto least_step = static_cast<std::int32_t>(std::ceil(q_.within_s / h - 1e-6));
   while (Work_s() - begun_s < options_.improve_cpu_s && !IsAbandoned(q_.abandoned)) {
-    const double end_s = End();
+    double end_s = 0;
+    for (std::uint32_t i = 0; i < scene_.size(); ++i) end_s = std::max(end_s, EndOfUnit(i));
     if (end_s <= kGoodEnough * q_.within_s) break;
     const auto now = static_cast<std::int32_t>(std::ceil(end_s / h - 1e-6));
     const auto cut =
@@ -437,6 +459,7 @@ LocalSearchResult DenseSearch::Run() {
     if (scene_.is_place(i) && (motions_.track(i).legs().empty() || motions_.InConflict(i)))
       result.in_conflict.push_back(i);
   motions_.MoveInto(&result);
+  result.work_s = Work_s();
   return result;
 }
 

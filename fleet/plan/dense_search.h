@@ -15,6 +15,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "fleet/plan/local_search.h"
 
@@ -22,6 +23,8 @@ namespace focalfleet {
 
 struct DenseSearchOptions {
   double within = 1.25;  // times request.within_s: the time of the first plan
+  /// CPU time until all are clear of each other, counted as work. Units: s of a usual machine.
+  double complete_cpu_s = std::numeric_limits<double>::infinity();
   /// CPU time for an earlier end, counted as work. Units: s of a usual machine.
   double improve_cpu_s = 0;
 };

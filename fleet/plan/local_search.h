@@ -29,6 +29,7 @@ struct LocalSearchResult {
   /// ascending; empty: all are clear of each other at all times
   std::vector<std::uint32_t> in_conflict;
   bool starved = false;  // the limits of power leave a unit no time at all: nothing was tried
+  double work_s = 0;  // of a dense search, counted. Units: s of CPU of a usual machine
   /// Pairs that are clear, but not with notice. Lower index first, sorted.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> without_notice;
 };

@@ -55,6 +55,31 @@ TEST(DensePlan, ServesAllSoonAndNeverBelowTheBoundOfAnyPair) {
   }
 }
 
+/// A dense plate of which 15 of 100 units stand for good where they start, in any pose.
+PlanningFleet BrokenFleet(std::uint64_t seed) {
+  PlanningFleet fleet = FleetOf(MakeHexLayout(SdssLike(169)));
+  Rng lot = Rng::Stream(Seed(seed), "broken");
+  for (std::uint8_t& frozen : fleet.frozen) frozen = lot.Below(100) < 15 ? 1 : 0;
+  DrawStartAndTargets(&fleet, Seed(seed));
+  return fleet;
+}
+
+/// Units that the broken ones wall in are given up, and the others do not wait for them.
+TEST(DensePlan, GoesAroundUnitsThatStandForGood) {
+  std::ptrdiff_t unproven = 0;
+  for (const std::uint64_t seed : {900u, 901u, 904u}) {
+    const PlanningFleet fleet = BrokenFleet(seed);
+    const auto plan = MakePlan(fleet.request(), {});
+    ASSERT_TRUE(plan) << plan.error().text;
+    ExpectClear(fleet, *plan);
+    unproven += std::ranges::count_if(plan->unserved, [](const Unserved& unserved) {
+      return unserved.why == UnservedWhy::kBlocked && !unserved.proof;
+    });
+    EXPECT_LE(plan->makespan_s, 1.5 * plan->bound_s) << "seed " << Seed(seed);
+  }
+  EXPECT_LE(unproven, 1);
+}
+
 TEST(DensePlan, IsTheSameBitForBitAndNeverWorseWithWork) {
   const PlanningFleet fleet = DenseFleet(3);
   const auto first = MakePlan(fleet.request(), {.improve_cpu_s = 0});
