@@ -65,6 +65,8 @@ constexpr AlarmKind kKinds[] = {
     {kPlaneHeard, "PlaneHeard", kInfo, kNote},
     {kSectorSilent, "SectorSilent", kError, kEvent},
     {kSectorStartMissed, "SectorStartMissed", kWarning, kEvent},
+    {kSectorClockLoose, "SectorClockLoose", kError, kOfHost},
+    {kSectorClocksGood, "SectorClocksGood", kInfo, kNote},
 };
 
 constexpr bool InOrder() {

@@ -72,13 +72,15 @@ enum class AlarmName : std::uint8_t {
   kRunUpsLeftOut,
   kUnitHeldBack,
   kUnitRetargeted,
-  // a sector of a plane
+  // a plane
   kPlaneSilent,
   kPlaneHeard,
   kSectorSilent,
   kSectorStartMissed,
+  kSectorClockLoose,
+  kSectorClocksGood,
 };
-inline constexpr AlarmName kLastAlarmName = AlarmName::kSectorStartMissed;
+inline constexpr AlarmName kLastAlarmName = AlarmName::kSectorClocksGood;
 inline constexpr std::size_t kAlarmNameCount = static_cast<std::size_t>(kLastAlarmName) + 1;
 
 /// When an open alarm is over.

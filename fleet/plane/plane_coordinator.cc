@@ -69,6 +69,7 @@ PlaneCoordinator::PlaneCoordinator(const PlaneLayout* plane, const PlaneTimes& t
       self_(self),
       record_(std::move(kept)),
       sectors_(plane, times),
+      clock_watch_(times.clock_patience),
       parts_(plane->sectors()) {
   if (record_.under_way) {
     view_.configuration = record_.under_way->id;
@@ -84,6 +85,7 @@ void PlaneCoordinator::Step(const PlaneInputs& inputs, PlaneEffects* effects) {
   if (since_.ns == INT64_MIN) since_ = now_;
   for (const SectorReport& report : inputs.reports) sectors_.Hear(report, now_);
   sectors_.Look(now_);
+  clock_watch_.Look(sectors_, now_, &out_->notes);
   const PlaneEpoch highest = sectors_.highest_accepted();
   const bool in_charge = view_.phase != PlanePhase::kListening;
   if (in_charge && record_.epoch < highest) {

@@ -34,6 +34,7 @@
 #include "fleet/plane/plane_layout.h"
 #include "fleet/plane/plane_plan.h"
 #include "fleet/plane/sector_book.h"
+#include "fleet/plane/sector_clock_watch.h"
 
 namespace focalfleet {
 
@@ -99,6 +100,7 @@ struct PlaneEffects {
   std::uint64_t record_number = 0;
   std::vector<ReplyEffect> replies;
   std::vector<std::string> log;  // for people
+  std::vector<ShellNote> notes;  // alarms of the plane, and their ends
   HostInstant wake_at = kNever;
 };
 
@@ -168,6 +170,7 @@ class PlaneCoordinator {
   std::uint64_t record_number_ = 0;
   std::uint64_t kept_ = 0;
   SectorBook sectors_;
+  SectorClockWatch clock_watch_;
   PlaneView view_;
   HostInstant now_;
   HostInstant since_{INT64_MIN};     // the phase began

@@ -121,6 +121,7 @@ struct SectorReport {
   OutcomeCounts counts;  // of the configuration under way, or the last one
   double start_delay_s = 0;
   std::string trouble;  // why an order was not taken; usually empty
+  std::string door;     // where the sector's daemon takes requests, for people: host:socket
   /// The last order that was heard, for the clocks (sector_clock.h). Not used before there is one.
   struct Echo {
     HostInstant sent;

@@ -345,7 +345,8 @@ SectorReport SectorAgent::Report() const {
                       .last_state = here_.last_state,
                       .counts = in.configuration->counts,
                       .start_delay_s = config_.start_delay.seconds(),
-                      .trouble = here_.trouble};
+                      .trouble = here_.trouble,
+                      .door = config_.door};
   if (ordered_at_) {
     report.echo = echo_;
     report.echo->returned = in.now;

@@ -39,6 +39,7 @@ namespace focalfleet {
 struct SectorAgentConfig {
   std::uint32_t sector = 0;
   std::uint64_t layout = 0;                    // DigestOf
+  std::string door = {};                       // SectorReport::door
   DurationNs start_delay = Milliseconds(250);  // CoordinatorConfig::start_delay
   DurationNs report_period = Milliseconds(200);
   /// During a round, and before its start while there is time.

@@ -88,6 +88,14 @@ bool SectorBook::IsHeard(std::uint32_t sector) const {
   return entry.report && now_ - entry.heard <= times_.silence;
 }
 
+bool SectorBook::HasLooseClock(std::uint32_t sector) const {
+  const Entry& entry = entries_[sector];
+  if (!IsHeard(sector) || entry.report->accepted != epoch_ || entry.report->layout != entry.digest)
+    return false;
+  const std::optional<ClockOffset> clock = entry.clock.At(now_);
+  return clock && times_.clock_allowance < clock->bound;
+}
+
 PlaneEpoch SectorBook::highest_accepted() const {
   PlaneEpoch highest;
   for (const Entry& entry : entries_)

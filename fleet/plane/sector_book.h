@@ -34,6 +34,8 @@ struct PlaneTimes {
   DurationNs finish_patience = Milliseconds(10'000);
   /// Two sectors' clocks may differ by this much; plans allow for it.
   DurationNs clock_allowance = Milliseconds(5);
+  /// A clock that is known to less for so long is an alarm.
+  DurationNs clock_patience = Milliseconds(3000);
   /// The news of an end takes this long to the next sector: SectorAgentConfig::suspicion, a word
   /// under way, and two turns of a host. Plans are made with it.
   DurationNs border_notice = Milliseconds(500);
@@ -72,6 +74,9 @@ class SectorBook {
   [[nodiscard]] bool IsUsable(std::uint32_t sector) const {
     return entries_[sector].trouble.empty();
   }
+  /// The sector is heard, follows this coordinator, and its clock is known to less than plans allow
+  /// for.
+  [[nodiscard]] bool HasLooseClock(std::uint32_t sector) const;
   [[nodiscard]] PlaneEpoch highest_accepted() const;
 
   /// The sector is to do this now. The same order again has no effect.

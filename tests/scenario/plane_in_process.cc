@@ -244,6 +244,7 @@ void PlaneInProcess::TurnPlane(std::uint32_t which) {
   }
   at.replies.insert(at.replies.end(), effects.replies.begin(), effects.replies.end());
   at.log.insert(at.log.end(), effects.log.begin(), effects.log.end());
+  at.notes.insert(at.notes.end(), effects.notes.begin(), effects.notes.end());
   at.wake = effects.wake_at == kNever ? kNever : now_ + (effects.wake_at - now);
 }
 
@@ -282,6 +283,7 @@ void PlaneInProcess::Turn() {
 
 HostInstant PlaneInProcess::Next() const {
   HostInstant next = std::min(world_->NextEvent(), network.due());
+  if (now_ < look_at) next = std::min(next, look_at);
   for (const Sector& sector : sectors) {
     if (sector.coordinator == nullptr) continue;
     next = std::min({next, sector.wake, sector.storage.due()});

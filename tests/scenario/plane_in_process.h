@@ -72,6 +72,7 @@ class PlaneInProcess {
     HostInstant job_due = kNever;
     std::vector<ReplyEffect> replies;  // all
     std::vector<std::string> log;      // all
+    std::vector<ShellNote> notes;      // all
   };
 
   explicit PlaneInProcess(const Options& options);
@@ -114,6 +115,8 @@ class PlaneInProcess {
   std::function<void(std::uint32_t, const SectorAgent&, const Command&)> commanded;
   /// Called after each step of time.
   std::function<void()> looked;
+  /// No step of time passes over this instant.
+  HostInstant look_at = kNever;
 
  private:
   void Turn();

@@ -36,10 +36,12 @@ class PlaneNetwork {
     const int copies = rng_.Uniform() < weather.doubled ? 2 : 1;
     for (int n = 0; n < copies; ++n) {
       const double spread = rng_.Uniform(0, 1);
-      const DurationNs delay{
+      DurationNs delay{
           weather.delay_least.ns +
           static_cast<std::int64_t>(
               spread * static_cast<double>((weather.delay_most - weather.delay_least).ns))};
+      for (const std::uint32_t node : {from, to})
+        if (const auto at = slow.find(node); at != slow.end()) delay = delay + at->second;
       under_way_.emplace(now + delay, Delivery{to, message});
     }
   }
@@ -57,10 +59,12 @@ class PlaneNetwork {
   void Cut(std::uint32_t from, std::uint32_t to, HostInstant until) { cut_[{from, to}] = until; }
   void Heal() {
     cut_.clear();
+    slow.clear();
     weather = {};
   }
 
   Weather weather;
+  std::map<std::uint32_t, DurationNs> slow;  // messages from and to a node take so much longer
   std::uint64_t sent = 0;
 
  private:

@@ -15,6 +15,22 @@ constexpr PlanePhase kPhases[] = {PlanePhase::kRecording, PlanePhase::kGathering
                                   PlanePhase::kPlanning,  PlanePhase::kPreparing,
                                   PlanePhase::kMoving,    PlanePhase::kFinishing};
 
+/// Units: s. A fault that is drawn for a phase is to strike in it, however short it is.
+double LastsAbout(PlanePhase phase) {
+  switch (phase) {
+    case PlanePhase::kRecording:
+      return 0.005;
+    case PlanePhase::kGathering:
+      return 0.4;
+    case PlanePhase::kPlanning:
+      return 0.1;
+    case PlanePhase::kFinishing:
+      return 0.1;
+    default:
+      return 1.2;
+  }
+}
+
 class Night {
  public:
   explicit Night(const PlaneNightOptions& options)
@@ -73,7 +89,7 @@ class Night {
       // Half of the faults in motion strike around the start, the others anywhere in it.
       armed.after_s = options_.fault                   ? options_.after_s
                       : motion && rng_.Uniform() < 0.5 ? rng_.Uniform(0, 25)
-                                                       : rng_.Uniform(0, 1.2);
+                                                       : rng_.Uniform(0, LastsAbout(armed.phase));
       armed.lasts_s = rng_.Uniform(0.05, kFaultMost_s);
       armed.victim = static_cast<std::uint32_t>(rng_.Below(plane_.layout().sectors()));
       armed_faults_.push_back(armed);
@@ -101,10 +117,12 @@ class Night {
       second_applies_ = false;
       plane_.Apply(plane_.DrawTargets(3 * options_.seed + 7), 1);
     }
+    plane_.look_at = kNever;
     for (Armed& armed : armed_faults_) {
       if (!armed.at && phase == armed.phase) armed.at = plane_.now() + Seconds(armed.after_s);
       if (armed.at && !armed.struck && plane_.now() >= *armed.at) Strike(&armed);
       if (armed.struck && !armed.over && plane_.now() >= armed.ends) End(&armed);
+      if (armed.at && !armed.struck) plane_.look_at = std::min(plane_.look_at, *armed.at);
     }
   }
 
@@ -259,6 +277,7 @@ class Night {
     if (!plane_.RunUntil([this] { return plane_.IsIdle(); }, Seconds(400)))
       Broken("the first configuration does not end: " + std::string(Name(*Phase())) +
              ", waits for " + plane_.plane().view().waiting_for);
+    LookAtFates();
     plane_.Run(Seconds(8));
     // An operator clears the faults of units.
     for (const PositionerIndex i : halted_) {
@@ -275,6 +294,16 @@ class Night {
     judge_.LookAtStores();
   }
 
+  void LookAtFates() {
+    result_.rounds = plane_.plane().view().rounds;
+    for (std::uint32_t n = 0; n < plane_.layout().layout().size(); ++n) {
+      const bool victim = plane_.layout().SectorOf({n}) == armed_faults_[0].victim;
+      PlaneFate& fate = victim ? result_.victims : result_.others;
+      ++fate.units;
+      ++fate.outcomes[static_cast<std::size_t>(plane_.unit({n}).outcome)];
+    }
+  }
+
   void Converge(const std::vector<std::optional<Pose>>& targets) {
     Tell("the last configuration");
     plane_.Apply(targets);
@@ -289,6 +318,7 @@ class Night {
     for (std::uint32_t n = 0; n < targets.size(); ++n)
       lost += IsPlace(plane_.unit({n}).knowledge) ? 0u : 1u;
     const OutcomeCounts& counts = plane_.plane().view().counts;
+    result_.completed = counts.arrived;
     // Units beside one of unknown place may find no way.
     if (counts.arrived != targets.size() && halted_.empty() && lost == 0) {
       Broken("the last configuration is not whole: " + std::to_string(counts.arrived) + " of " +

@@ -31,8 +31,19 @@ enum class PlaneFault : std::uint8_t {
 inline constexpr std::size_t kPlaneFaultCount = 13;
 const char* Name(PlaneFault fault);
 
+/// The units of the configuration that the faults struck, by what became of their targets.
+struct PlaneFate {
+  std::uint32_t units = 0;
+  /// Counts by TargetOutcome; kNone and kPending are those that were left out.
+  std::array<std::uint32_t, static_cast<std::size_t>(kLastTargetOutcome) + 1> outcomes{};
+};
+
 struct PlaneNightResult {
   std::uint64_t seed = 0;
+  PlaneFate victims;  // the units of the sector that the first fault is about
+  PlaneFate others;
+  std::uint32_t rounds = 0;         // of that configuration
+  std::uint32_t completed = 0;      // units that the last configuration brought to their targets
   std::vector<std::string> broken;  // empty: every rule was kept
   /// How often a fault struck while the plane was in a phase.
   std::array<std::array<std::uint32_t, kPlanePhaseCount>, kPlaneFaultCount> struck{};
