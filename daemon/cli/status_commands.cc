@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
@@ -13,6 +16,7 @@
 #include "daemon/cli/time_text.h"
 #include "daemon/cli/unit_choice.h"
 #include "daemon/cli/versions.h"
+#include "daemon/files/fits_table.h"
 #include "daemon/files/text_file.h"
 
 namespace focalfleet::cli {
@@ -123,6 +127,7 @@ std::string DescribePlane(const Json& status, bool colour_on) {
   if (const std::string waits = TextIn(plane, "waiting_for"); !waits.empty())
     text += "waits for  " + Paint(colour_on, Colour::kYellow, waits) + "\n";
   for (const Json& sector : ListIn(plane, "sectors")) text += DescribeSector(sector, colour_on);
+  text += DescribeOpenAlarms(ObjectIn(status, "alarms"), colour_on);
   if (CountIn(configuration, "id") == 0) return text + "no configuration yet";
   const Json& guarantee = ObjectIn(configuration, "guarantee");
   text += fmt::format(
@@ -241,11 +246,49 @@ std::string NameUnknown(const Json& unknown) {
   return text;
 }
 
+double NumberOrNan(const Json& row, const char* key) {
+  const auto found = row.find(key);
+  return found != row.end() && found->is_number() ? found->get<double>() : std::nan("");
+}
+
+/// Where all fibres are, for pipelines; docs/files.md. A unit of unknown place has no numbers.
+FitsTable PlacesOf(const Json& rows) {
+  std::vector<std::int64_t> units, sectors;
+  std::vector<double> x, y, target_x, target_y, age;
+  std::vector<std::string> theta, phi, outcome;
+  for (const Json& row : rows) {
+    units.push_back(static_cast<std::int64_t>(CountIn(row, "unit_id")));
+    sectors.push_back(row.contains("sector") ? static_cast<std::int64_t>(CountIn(row, "sector"))
+                                             : -1);
+    target_x.push_back(NumberOrNan(row, "target_x_mm"));
+    target_y.push_back(NumberOrNan(row, "target_y_mm"));
+    x.push_back(NumberOrNan(row, "x_mm"));
+    y.push_back(NumberOrNan(row, "y_mm"));
+    theta.push_back(TextIn(row, "theta_witness"));
+    phi.push_back(TextIn(row, "phi_witness"));
+    outcome.push_back(TextIn(row, "outcome"));
+    age.push_back(NumberOrNan(row, "age_s"));
+  }
+  return {.name = "PLACES",
+          .keys = {{"ORIGIN", std::string("focalfleet"), ""}},
+          .columns = {{"UNIT_ID", "", std::move(units)},
+                      {"SECTOR", "", std::move(sectors)},
+                      {"TARGET_X_MM", "mm", std::move(target_x)},
+                      {"TARGET_Y_MM", "mm", std::move(target_y)},
+                      {"X_MM", "mm", std::move(x)},
+                      {"Y_MM", "mm", std::move(y)},
+                      {"THETA_WITNESS", "", std::move(theta)},
+                      {"PHI_WITNESS", "", std::move(phi)},
+                      {"OUTCOME", "", std::move(outcome)},
+                      {"AGE_S", "s", std::move(age)}}};
+}
+
 ExitCode RunState(const Context& context, const StateOptions& options) {
   const auto state = Ask(context, {.verb = "state"});
   if (!state) return Report(context, state.error());
   const StateFile file = MakeStateFile(ListIn(*state, "rows"));
-  if (!file.unknown.empty() && !options.allow_unknown) {
+  const bool as_fits = options.out.ends_with(".fits");
+  if (!file.unknown.empty() && !options.allow_unknown && !as_fits) {
     return Report(
         context,
         {ErrorCode::kRefused,
@@ -256,9 +299,9 @@ ExitCode RunState(const Context& context, const StateOptions& options) {
   }
   const bool to_file = !options.out.empty() && !context.stdout_is_file;
   if (to_file) {
-    if (const auto written = WriteFileAtomically(options.out, file.csv); !written) {
-      return Report(context, written.error());
-    }
+    const Status written = as_fits ? WriteFitsTable(options.out, PlacesOf(ListIn(*state, "rows")))
+                                   : WriteFileAtomically(options.out, file.csv);
+    if (!written) return Report(context, written.error());
   }
   if (context.json) {
     PrintJson({{"units", file.rows},
@@ -268,11 +311,14 @@ ExitCode RunState(const Context& context, const StateOptions& options) {
   } else if (!to_file) {
     PrintText(file.csv);
   } else {
-    Say(context, fmt::format("{}: {}", options.out, Count(file.rows, "unit", "units")));
+    Say(context,
+        fmt::format("{}: {}", options.out,
+                    Count(file.rows + (as_fits ? file.unknown.size() : 0), "unit", "units")));
   }
   if (file.unknown.empty()) return ExitCode::kOk;
   if (!context.json) {
-    Complain(fmt::format("focalfleet: left out: {}\n", NameUnknown(file.unknown)));
+    Complain(fmt::format("focalfleet: {}: {}\n", as_fits ? "of unknown place" : "left out",
+                         NameUnknown(file.unknown)));
   }
   return ExitCode::kSomeUnserved;
 }
@@ -283,7 +329,9 @@ void AddState(CommandLine* line) {
       "  focalfleet state --out state.csv\n"
       "  focalfleet plan --units units.csv --targets t.csv --from state.csv --out plan.csv");
   auto options = std::make_shared<StateOptions>();
-  AddFile(command, "--out", &options->out, "File to write (default: stdout)");
+  AddFile(command, "--out", &options->out,
+          "File to write: .fits for the places of all fibres, or else state.csv (default: "
+          "stdout)");
   command->add_flag("--allow-unknown", options->allow_unknown,
                     "Leave out units of unknown place (a comment names each), instead of refusing");
   OnChosen(line, command, options, RunState);

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <map>
+#include <tuple>
 
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/progress_bar.h"
@@ -27,40 +28,93 @@ struct WatchOptions {
   double wait_s = 5;
 };
 
-// Picture holds all values so far: DDS reports changes, but a picture needs the whole.
-struct Picture {
+/// All of one daemon: of its own, of a sector, or of the coordinator of a plane.
+struct Daemon {
   std::optional<FleetStatusValue> fleet;
   std::optional<ConfigurationProgressValue> configuration;
   std::optional<AuditHeadValue> audit_head;
+  steady_clock::time_point heard = steady_clock::now();
+  bool silent = false;
+};
+
+// Picture holds all values so far: DDS reports changes, but a picture needs the whole.
+struct Picture {
+  /// The key is the sector; none: a daemon of its own, or the coordinator.
+  std::map<std::optional<std::uint32_t>, Daemon> daemons;
   std::map<BusId, BusStatusValue> buses;
   std::map<UnitId, UnitStatusValue> units;
-  std::map<std::uint64_t, AlarmValue> alarms;  // the newest kAlarmsShown
+  /// The newest kAlarmsShown, by their time and number.
+  std::map<std::tuple<WallTime, std::optional<std::uint32_t>, std::uint64_t>, AlarmValue> alarms;
+  steady_clock::time_point grew = steady_clock::now();  // a further daemon was heard
+
+  [[nodiscard]] bool IsOfPlane() const {
+    return !daemons.empty() && daemons.rbegin()->first.has_value();
+  }
+  /// The daemon that has the whole: the coordinator, or one of its own. Null: none is heard.
+  [[nodiscard]] const Daemon* whole() const {
+    const auto at = daemons.find(std::nullopt);
+    return at == daemons.end() ? nullptr : &at->second;
+  }
 };
+/// A daemon says once a second how its fleet is. Three times that is no delay of a busy host.
+constexpr milliseconds kSilentAfter(3000);
+/// Without a coordinator nobody says how many sectors there are.
+constexpr milliseconds kSettled(2000);
 constexpr std::size_t kAlarmsShown = 8;
 constexpr std::size_t kUnitsShown = 12;
 
 // Texts from DDS may come from any program on the network, so they are made safe for a terminal.
 void Absorb(const StatusUpdate& update, Picture* picture) {
-  if (update.fleet) {
-    picture->fleet = update.fleet;
-    picture->fleet->version = Printable(update.fleet->version);
+  for (const FleetStatusValue& fleet : update.fleets) {
+    const auto [at, is_new] = picture->daemons.try_emplace(fleet.sector);
+    Daemon& daemon = at->second;
+    if (is_new) picture->grew = steady_clock::now();
+    daemon.fleet = fleet;
+    daemon.fleet->version = Printable(fleet.version);
+    daemon.heard = steady_clock::now();
   }
-  if (update.audit_head) picture->audit_head = update.audit_head;
-  if (update.configuration) {
-    picture->configuration = update.configuration;
-    picture->configuration->view.source = Printable(update.configuration->view.source);
+  for (const AuditHeadValue& head : update.audit_heads)
+    picture->daemons[head.sector].audit_head = head;
+  for (const ConfigurationProgressValue& value : update.configurations) {
+    auto& kept = picture->daemons[value.sector].configuration = value;
+    kept->view.source = Printable(value.view.source);
   }
   for (const BusStatusValue& bus : update.buses) picture->buses[bus.bus] = bus;
   for (const UnitStatusValue& unit : update.units) picture->units[unit.unit] = unit;
   for (const AlarmValue& alarm : update.alarms) {
-    AlarmValue& kept = picture->alarms[alarm.row.id] = alarm;
+    AlarmValue& kept = picture->alarms[{alarm.at, alarm.sector, alarm.row.id}] = alarm;
     kept.row.text = Printable(alarm.row.text);
   }
   while (picture->alarms.size() > kAlarmsShown) picture->alarms.erase(picture->alarms.begin());
 }
 
+/// True: a daemon has fallen silent, or is heard again.
+bool LookForSilence(Picture* picture) {
+  bool changed = false;
+  for (auto& [sector, daemon] : picture->daemons) {
+    const bool silent = steady_clock::now() - daemon.heard > kSilentAfter;
+    changed |= silent != daemon.silent;
+    daemon.silent = silent;
+  }
+  return changed;
+}
+
+bool IsHeard(const Picture& picture) {
+  for (const auto& [sector, daemon] : picture.daemons)
+    if (daemon.fleet) return true;
+  return false;
+}
+
 bool WholeFleetIsThere(const Picture& picture) {
-  return picture.fleet && picture.units.size() >= picture.fleet->units;
+  std::size_t units = 0;
+  for (const auto& [sector, daemon] : picture.daemons)
+    if (sector && daemon.fleet) units += daemon.fleet->units;
+  const Daemon* const whole = picture.whole();
+  if (whole != nullptr && whole->fleet)
+    units = whole->fleet->units;
+  else if (steady_clock::now() - picture.grew < kSettled)
+    return false;
+  return picture.units.size() >= units;
 }
 
 // ---- JSON
@@ -149,6 +203,7 @@ Json JsonOf(const AlarmValue& alarm) {
            {"severity", Name(alarm.row.severity)},
            {"name", Name(alarm.row.name)},
            {"text", alarm.row.text}};
+  if (alarm.sector) row["sector"] = *alarm.sector;
   if (alarm.row.unit) row["unit_id"] = alarm.row.unit->value;
   if (alarm.row.bus) row["bus_id"] = alarm.row.bus->value;
   return row;
@@ -161,22 +216,51 @@ Json Rows(const Values& values) {
   return rows;
 }
 
+/// A sector of a plane, as far as there is news of it.
+Json JsonOfSector(std::uint32_t sector, const Daemon& daemon, const Daemon& news) {
+  Json object{
+      {"sector", sector},
+      {"silent", daemon.silent},
+      {"heard_s_ago", std::chrono::duration<double>(steady_clock::now() - daemon.heard).count()}};
+  if (news.fleet) object["fleet"] = Counts(*news.fleet);
+  if (news.configuration) object["configuration"] = JsonOf(*news.configuration);
+  if (news.audit_head) object["audit_head"] = Printable(news.audit_head->head);
+  return object;
+}
+
 // The update as one object; members without news are omitted.
-Json JsonOf(const StatusUpdate& update) {
+Json JsonOf(const StatusUpdate& update, const Picture& picture) {
   Json object = Json::object();
-  if (update.fleet) object["fleet"] = Counts(*update.fleet);
-  if (update.configuration) object["configuration"] = JsonOf(*update.configuration);
+  std::map<std::optional<std::uint32_t>, Daemon> news;
+  for (const FleetStatusValue& fleet : update.fleets) news[fleet.sector].fleet = fleet;
+  for (const auto& value : update.configurations) news[value.sector].configuration = value;
+  for (const AuditHeadValue& head : update.audit_heads) news[head.sector].audit_head = head;
+  for (const auto& [sector, daemon] : picture.daemons)
+    if (daemon.silent) news.try_emplace(sector);
+  Json sectors = Json::array();
+  for (const auto& [sector, daemon] : news) {
+    if (sector) {
+      sectors.push_back(JsonOfSector(*sector, picture.daemons.at(sector), daemon));
+      continue;
+    }
+    if (daemon.fleet) object["fleet"] = Counts(*daemon.fleet);
+    if (daemon.configuration) object["configuration"] = JsonOf(*daemon.configuration);
+    if (daemon.audit_head) object["audit_head"] = Printable(daemon.audit_head->head);
+  }
+  if (!sectors.empty()) object["sectors"] = std::move(sectors);
   if (!update.units.empty()) object["units"] = Rows(update.units);
   if (!update.buses.empty()) object["buses"] = Rows(update.buses);
   if (!update.alarms.empty()) object["alarms"] = Rows(update.alarms);
-  if (update.audit_head) object["audit_head"] = Printable(update.audit_head->head);
   return object;
 }
 
 StatusUpdate Whole(const Picture& picture) {
-  StatusUpdate whole{.fleet = picture.fleet,
-                     .configuration = picture.configuration,
-                     .audit_head = picture.audit_head};
+  StatusUpdate whole;
+  for (const auto& [sector, daemon] : picture.daemons) {
+    if (daemon.fleet) whole.fleets.push_back(*daemon.fleet);
+    if (daemon.configuration) whole.configurations.push_back(*daemon.configuration);
+    if (daemon.audit_head) whole.audit_heads.push_back(*daemon.audit_head);
+  }
   for (const auto& [id, unit] : picture.units) whole.units.push_back(unit);
   for (const auto& [id, bus] : picture.buses) whole.buses.push_back(bus);
   for (const auto& [id, alarm] : picture.alarms) whole.alarms.push_back(alarm);
@@ -262,18 +346,46 @@ std::string DescribeAlarms(const Picture& picture, bool colour_on) {
   std::string text;
   for (const auto& [id, alarm] : picture.alarms) {
     const Colour colour = alarm.row.severity == Severity::kError ? Colour::kRed : Colour::kYellow;
-    text += fmt::format("{}  {}  {}: {}\n", ToIso8601(alarm.at),
-                        Paint(colour_on, colour, Name(alarm.row.severity)), Name(alarm.row.name),
-                        alarm.row.text);
+    text += fmt::format("{}  {}  {}{}: {}\n", ToIso8601(alarm.at),
+                        Paint(colour_on, colour, Name(alarm.row.severity)),
+                        alarm.sector ? fmt::format("sector {}: ", *alarm.sector) : "",
+                        Name(alarm.row.name), alarm.row.text);
   }
   return text;
 }
 
+std::string DescribeSector(std::uint32_t sector, const Daemon& daemon, bool colour_on) {
+  std::string text = fmt::format("sector {}   ", sector);
+  if (daemon.silent) {
+    const auto age = std::chrono::duration<double>(steady_clock::now() - daemon.heard);
+    return text +
+           Paint(colour_on, Colour::kRed,
+                 fmt::format("silent for {:.0f} s, its units are as last heard", age.count())) +
+           "\n";
+  }
+  if (!daemon.fleet) return text + "nothing heard of its fleet yet\n";
+  const FleetStatusValue& fleet = *daemon.fleet;
+  text += fmt::format("{}, {} units, {} enabled", fleet.busy ? "busy" : "idle", fleet.units,
+                      fleet.enabled);
+  if (fleet.store_failing) text += Paint(colour_on, Colour::kRed, ", STORE FAILING");
+  if (daemon.configuration) {
+    const OutcomeCounts& counts = daemon.configuration->view.counts;
+    text += fmt::format(", {}, {} of {} arrived", Name(daemon.configuration->view.state),
+                        counts.arrived, counts.targeted);
+  }
+  return text + "\n";
+}
+
 void Draw(const Context& context, const Picture& picture, bool over) {
   std::string text;
-  if (picture.fleet) text += DescribeFleet(*picture.fleet, context.colour_out);
+  const Daemon* const whole = picture.whole();
+  if (whole != nullptr && whole->fleet) text += DescribeFleet(*whole->fleet, context.colour_out);
+  if (picture.IsOfPlane() && (whole == nullptr || whole->silent))
+    text += Paint(context.colour_out, Colour::kRed, "the plane's coordinator is not heard") + "\n";
+  for (const auto& [sector, daemon] : picture.daemons)
+    if (sector) text += DescribeSector(*sector, daemon, context.colour_out);
   text += DescribeBuses(picture, context.colour_out);
-  if (picture.configuration) text += DescribeProgress(*picture.configuration);
+  if (whole != nullptr && whole->configuration) text += DescribeProgress(*whole->configuration);
   text += DescribeUnits(picture) + DescribeAlarms(picture, context.colour_out);
   if (over)
     PrintScreen(text);
@@ -310,22 +422,24 @@ ExitCode Loop(const Context& context, const WatchOptions& options, StatusReader*
       return Report(context, taken.error(), ExitCode::kBroken);
     }
     Absorb(update, &picture);
+    const bool silence = LookForSilence(&picture);
     const bool late = steady_clock::now() - begun > patience;
-    if (late && !picture.fleet) return ReportNoPublisher(context, options, reader->writer_seen());
-    if (picture.fleet && !reader->writer_alive()) return ReportNoPublisher(context, options, true);
+    const bool heard = IsHeard(picture);
+    if (late && !heard) return ReportNoPublisher(context, options, reader->writer_seen());
+    if (heard && !reader->writer_alive()) return ReportNoPublisher(context, options, true);
     if (options.once) {
       // Late values are omitted: waiting for them might never end.
-      if (!picture.fleet || (!late && !WholeFleetIsThere(picture))) continue;
+      if (!heard || (!late && !WholeFleetIsThere(picture))) continue;
       if (context.json) {
-        PrintJson(JsonOf(Whole(picture)));
+        PrintJson(JsonOf(Whole(picture), picture));
       } else {
         Draw(context, picture, false);
       }
       return ExitCode::kOk;
     }
-    if (update.count() == 0) continue;
+    if (update.count() == 0 && !silence) continue;
     if (context.json) {
-      PrintJson(JsonOf(update));
+      PrintJson(JsonOf(update, picture));
     } else {
       Draw(context, picture, context.terminal_out);
     }
@@ -340,7 +454,8 @@ ExitCode RunWatch(const Context& context, const WatchOptions& options) {
   auto reader = StatusReader::Create(
       {.dds = {.domain = options.domain,
                .config_xml = config != nullptr ? config : "",
-               .partition = options.sector ? SectorPartition(*options.sector) : ""}});
+               .partition = options.sector ? SectorPartition(*options.sector) : ""},
+       .partitions = options.sector ? std::vector<std::string>() : AllPartitions()});
   if (!reader) return Report(context, reader.error(), ExitCode::kNoDaemon);
   return Loop(context, options, reader->get());
 }
@@ -352,7 +467,8 @@ void AddWatchCommand(CommandLine* line) {
                                  "  focalfleet watch\n  focalfleet watch --once\n"
                                  "  focalfleet watch --json | jq -c .fleet");
   auto options = std::make_shared<WatchOptions>();
-  command->add_option("--sector", options->sector, "Of a plane: this sector, by its number from 0");
+  command->add_option("--sector", options->sector,
+                      "Of a plane: this sector alone, by its number from 0");
   command->add_option("--domain", options->domain, "DDS domain")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "daemon/access/log_limit.h"
 #include "daemon/dds/credentials.h"
@@ -178,8 +179,14 @@ Result<Handle> MakeWriter(const Participant& participant, Handle topic,
 }
 
 Result<Handle> MakeReader(const Participant& participant, Handle topic,
-                          const std::string& partition) {
-  return ReaderWith(SharedQos(partition), participant, topic);
+                          const std::vector<std::string>& partitions, std::int32_t depth) {
+  const QosOwner qos = SharedQos({});
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+  std::vector<const char*> names;
+  for (const std::string& name : partitions) names.push_back(name.c_str());
+  if (!names.empty())
+    dds_qset_partition(qos.get(), static_cast<std::uint32_t>(names.size()), names.data());
+  return ReaderWith(qos, participant, topic);
 }
 
 Result<Handle> MakeListener(const Participant& participant, Handle topic, std::int32_t depth,

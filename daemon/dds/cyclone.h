@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "daemon/dds/dds_options.h"
 #include "protocol/base/result.h"
@@ -86,8 +88,10 @@ Result<Handle> MakeTopic(const Participant& participant, const dds_topic_descrip
 /// of their own are. A reader's may have wildcards.
 Result<Handle> MakeWriter(const Participant& participant, Handle topic,
                           const std::string& partition = {});
+/// A reader of several partitions, that keeps the last `depth` samples of each instance: a topic
+/// without a key has one instance for the daemons of all of them.
 Result<Handle> MakeReader(const Participant& participant, Handle topic,
-                          const std::string& partition = {});
+                          const std::vector<std::string>& partitions, std::int32_t depth);
 /// A reader that receives each sample from now on, and keeps the last `depth` of them.
 Result<Handle> MakeListener(const Participant& participant, Handle topic, std::int32_t depth,
                             const std::string& partition = {});

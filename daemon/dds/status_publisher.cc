@@ -4,6 +4,7 @@
 #include <dds/ddsc/dds_public_impl.h>
 
 #include <algorithm>
+#include <charconv>
 #include <deque>
 
 #include "daemon/dds/cyclone.h"
@@ -53,6 +54,18 @@ tl::unexpected<Error> BadCode(const char* of, std::uint64_t id, const char* whic
 
 std::string SectorPartition(std::optional<std::uint32_t> sector) {
   return sector ? "sector-" + std::to_string(*sector) : "sector-*";
+}
+
+std::vector<std::string> AllPartitions() { return {"", SectorPartition({}), kPlanePartition}; }
+
+std::optional<std::uint32_t> SectorOfPartition(std::string_view partition) {
+  constexpr std::string_view kBefore = "sector-";
+  if (!partition.starts_with(kBefore)) return std::nullopt;
+  partition.remove_prefix(kBefore.size());
+  std::uint32_t sector = 0;
+  const auto read = std::from_chars(partition.data(), partition.data() + partition.size(), sector);
+  const bool whole = read.ec == std::errc() && read.ptr == partition.data() + partition.size();
+  return whole ? std::optional(sector) : std::nullopt;
 }
 
 class StatusPublisher::Impl {

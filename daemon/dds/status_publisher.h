@@ -15,6 +15,9 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "daemon/dds/dds_options.h"
 #include "daemon/dds/status_values.h"
@@ -24,6 +27,12 @@ namespace focalfleet {
 
 /// The partition of all topics of a sector of a plane; none: of all sectors, for readers.
 std::string SectorPartition(std::optional<std::uint32_t> sector);
+/// The partition of the status of a plane's coordinator.
+inline constexpr const char* kPlanePartition = "plane";
+/// The partitions of all daemons: of their own, of sectors, and the coordinator's.
+std::vector<std::string> AllPartitions();
+/// The sector of a partition's name; none: it is not that of one sector.
+std::optional<std::uint32_t> SectorOfPartition(std::string_view partition);
 
 struct PublisherCounters {
   std::uint64_t samples = 0;

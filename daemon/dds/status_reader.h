@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "daemon/dds/status_publisher.h"
@@ -16,15 +17,19 @@
 namespace focalfleet {
 
 /// The samples that arrived. Alarms are kept one by one; of all else only the newest value is
-/// kept.
+/// kept. Where several partitions are read, `fleets`, `configurations` and `audit_heads` have the
+/// newest of each with its sector, and `fleet`, `configuration` and `audit_head` the newest of all.
 struct StatusUpdate {
   std::optional<FleetStatusValue> fleet;
+  std::vector<FleetStatusValue> fleets;
   std::optional<ConfigurationProgressValue> configuration;
+  std::vector<ConfigurationProgressValue> configurations;
   std::vector<UnitStatusValue> units;
   std::vector<UnitOrientationValue> orientations;
   std::vector<BusStatusValue> buses;
   std::vector<AlarmValue> alarms;
   std::optional<AuditHeadValue> audit_head;
+  std::vector<AuditHeadValue> audit_heads;
   std::uint32_t malformed = 0;
 
   [[nodiscard]] std::size_t count() const {
@@ -38,6 +43,9 @@ class StatusReader {
   struct Options {
     DdsOptions dds;
     bool units = true;  // false: the 5000 unit samples are not requested from the network
+    /// Partitions that are read together; empty: that of `dds` alone. An empty name is that of
+    /// daemons of their own.
+    std::vector<std::string> partitions = {};
   };
   static Result<std::unique_ptr<StatusReader>> Create(const Options& options);
   StatusReader(const StatusReader&) = delete;

@@ -6,12 +6,17 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "daemon/clock/wall_time.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
+
+/// The sector of a plane whose daemon says it; none: a daemon of its own. A reader of several
+/// partitions alone fills it in.
+using SectorOfValue = std::optional<std::uint32_t>;
 
 inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 inline constexpr std::size_t kWitnessCount = 5;
@@ -68,21 +73,25 @@ struct FleetStatusValue {
   double bus_load_max = 0;
   bool busy = false;
   bool store_failing = false;
+  SectorOfValue sector = {};
 };
 
 struct ConfigurationProgressValue {
   WallTime at;
   ConfigurationView view;  // its host instants are not sent; source: at most 255 bytes are sent
+  SectorOfValue sector = {};
 };
 
 struct AuditHeadValue {
   WallTime at;
   std::string head;  // as audit_chain.h writes it; at most 127 bytes are sent
+  SectorOfValue sector = {};
 };
 
 struct AlarmValue {
   WallTime at;
   AlarmRow row;  // text: at most 255 bytes are sent
+  SectorOfValue sector = {};
 };
 
 }  // namespace focalfleet

@@ -45,7 +45,7 @@ bool IsGood(const SectorReport& report) {
          static_cast<std::uint8_t>(report.stage) < kSectorStageCount &&
          report.last_state <= ConfigurationState::kFailed && IsClock(report.unordered) &&
          std::isfinite(report.start_delay_s) && report.start_delay_s >= 0 &&
-         report.start_delay_s <= 60 &&
+         report.start_delay_s <= 60 && report.door.size() <= limits::kTextBytes &&
          (!report.echo || (IsClock(report.echo->sent) && IsClock(report.echo->received) &&
                            IsClock(report.echo->returned)));
 }

@@ -82,7 +82,10 @@ class PlaneLink::Impl {
       };
       FOCALFLEET_TRY_ASSIGN(joined->orders_, topic(kPlaneOrderTopic));
       FOCALFLEET_TRY_ASSIGN(joined->reports_, topic(kSectorReportTopic));
-      FOCALFLEET_TRY_ASSIGN(joined->news_, topic(kBorderNewsTopic));
+      // A coordinator's credentials do not name it.
+      if (mail->options_.sector) {
+        FOCALFLEET_TRY_ASSIGN(joined->news_, topic(kBorderNewsTopic));
+      }
       FOCALFLEET_TRY(joined->Open());
       joined->thread_ = std::jthread([raw = joined.get()] { raw->Run(); });
       return joined;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "daemon/access/rights.h"
+#include "daemon/plane/plane_refusal.h"
 #include "daemon/usage/build_version.h"
 #include "fleet/files/line_limit.h"
 #include "fleet/files/targets_file.h"
@@ -30,6 +31,7 @@ Json SectorJson(const PlaneInstant& plane, std::uint32_t sector) {
   json["arrived"] = entry.report->counts.arrived;
   json["targeted"] = entry.report->counts.targeted;
   json["last_word"] = entry.report->trouble;
+  json["door"] = entry.report->door;
   return json;
 }
 
@@ -135,7 +137,9 @@ Json PlaneStatusJson(const PlaneInstant& plane) {
     sectors.push_back(SectorJson(plane, n));
   return {{"version", BuildVersion()},
           {"units", plane.plane->layout().size()},
+          {"time", ToIso8601(plane.at)},
           {"busy", plane.coordinator->busy()},
+          {"alarms", plane.alarms->CountsJson(plane.at)},
           {"plane",
            {{"phase", Name(view.phase)},
             {"epoch", view.epoch.number},
@@ -178,6 +182,21 @@ void PlaneRequests::Handle(const PlaneInstant& plane, const IncomingLine& line,
   }
   if (verb == "access") return Answer(pending, AccessJson(line.caller));
   if (verb == "status") return Answer(pending, PlaneStatusJson(plane));
+  if (PlaneAlarms::IsAbout(verb)) {
+    auto answer = plane.alarms->Answer(*request, NameOf(line.caller), plane.at);
+    if (verb != "alarms") options_.log(verb + " commanded by " + Describe(line.caller));
+    return Answer(pending, answer);
+  }
+  if (verb == "state") {
+    // The answer is spliced in as text, into the frame that EncodeResult makes.
+    std::string answer = EncodeResult(pending.id, nullptr);
+    options_.read([&](const PlaneTable& table) {
+      answer.replace(answer.find("null"), 4,
+                     table.StateText(plane.coordinator->sectors(), plane.steady));
+    });
+    server_->Answer(pending.client, answer);
+    return;
+  }
   if (verb == "wait") {
     if (!plane.coordinator->busy()) return Answer(pending, Json{{"under_way", false}});
     pending.wait = pending.apply = true;
@@ -185,16 +204,13 @@ void PlaneRequests::Handle(const PlaneInstant& plane, const IncomingLine& line,
     return;
   }
   if (verb == "stop") {
-    if (request->args.contains("unit_id"))
-      return refuse({ErrorCode::kRefused, "a unit is stopped by the daemon of its sector"});
+    if (request->args.contains("unit_id")) return refuse(RefusalOf(plane, *request));
     options_.log("stop commanded by " + Describe(line.caller));
     commands->push_back({next_, PlaneStopCommand{}});
     pending_.emplace(next_++, pending);
     return;
   }
-  if (verb != "apply")
-    return refuse({ErrorCode::kRefused,
-                   verb + " is no verb of a plane's coordinator: ask the daemon of the sector"});
+  if (verb != "apply") return refuse(RefusalOf(plane, *request));
   if (line.overtaken)
     return refuse({ErrorCode::kRefused,
                    "a stop that came before apply was begun went ahead of it; "

@@ -1,6 +1,6 @@
-// The requests of the control socket of a plane's coordinator: status, apply, stop, wait, access.
-// They are those of a daemon of its own, for the whole plane; all other verbs are a sector's affair
-// and are asked of its own daemon.
+// The requests of the control socket of a plane's coordinator: status, apply, stop, wait, access
+// and those about alarms. They are those of a daemon of its own, for the whole plane; all other
+// verbs are a sector's affair and are asked of its own daemon.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,9 @@
 
 #include "daemon/control/line_exchange.h"
 #include "daemon/control/messages.h"
+#include "daemon/plane/plane_alarms.h"
 #include "daemon/plane/plane_link.h"
+#include "daemon/plane/plane_table.h"
 #include "fleet/plane/plane_coordinator.h"
 
 namespace focalfleet {
@@ -22,7 +24,11 @@ struct PlaneInstant {
   const PlaneLayout* plane = nullptr;
   const PlaneCoordinator* coordinator = nullptr;
   HostInstant now;
+  WallTime at;
   PlaneLinkCounters link;
+  PlaneAlarms* alarms = nullptr;
+  const PlaneTable* table = nullptr;  // null: it is not looked at now
+  SteadyTime steady = {};             // `now` of the table
 };
 
 /// The configuration under way, or the last one; docs/plane.md has the members.
@@ -34,6 +40,8 @@ class PlaneRequests {
   struct Options {
     DurationNs progress_period = Milliseconds(200);
     std::function<void(const std::string&)> log;  // one sentence for each command
+    /// Calls its argument with the table, which does not change meanwhile.
+    std::function<void(const std::function<void(const PlaneTable&)>&)> read;
   };
   PlaneRequests(std::unique_ptr<LineExchange> server, Options options)
       : server_(std::move(server)), options_(std::move(options)) {}

@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <random>
 #include <utility>
 
@@ -18,6 +20,7 @@
 #include "daemon/loop/event_loop.h"
 #include "daemon/loop/job_thread.h"
 #include "daemon/plane/plane_link.h"
+#include "daemon/plane/plane_output.h"
 #include "daemon/plane/plane_record_file.h"
 #include "daemon/plane/plane_requests.h"
 #include "daemon/process/control_door.h"
@@ -45,6 +48,20 @@ std::uint64_t RandomNumber() {
   return (std::uint64_t{chance()} << 31 | chance()) + 1;
 }
 
+std::optional<HttpServer::Options> MetricsServerOf(const DaemonConfig::Metrics& metrics) {
+  if (metrics.port == 0) return std::nullopt;
+  HttpServer::Options server{.address = metrics.address, .port = metrics.port};
+  server.names = metrics.names;
+  server.names.push_back(metrics.address);
+  server.tell = [](const std::string& trouble) {
+    if (trouble.empty())
+      spdlog::info("metrics are served again");
+    else
+      spdlog::warn("no metrics, it is tried again: {}", trouble);
+  };
+  return server;
+}
+
 class PlaneDaemon {
  public:
   explicit PlaneDaemon(const DaemonConfig& config) : config_(config), clock_(config.clock.speed) {}
@@ -57,8 +74,14 @@ class PlaneDaemon {
   void Wait();
   void Perform(PlaneEffects* effects);
   void TakeKept();
-  [[nodiscard]] PlaneInstant Instant() const {
-    return {plane_.get(), coordinator_.get(), now_, link_->counters()};
+  [[nodiscard]] PlaneInstant Instant() {
+    return {.plane = plane_.get(),
+            .coordinator = coordinator_.get(),
+            .now = now_,
+            .at = WallTime::Now(),
+            .link = link_->counters(),
+            .alarms = &alarms_,
+            .steady = std::chrono::steady_clock::now()};
   }
 
   DaemonConfig config_;
@@ -67,6 +90,8 @@ class PlaneDaemon {
   std::unique_ptr<PlaneRecordFile> record_;
   std::unique_ptr<EventSignal> signal_;
   std::unique_ptr<PlaneCoordinator> coordinator_;
+  PlaneAlarms alarms_;
+  std::unique_ptr<PlaneOutput> output_;
   std::unique_ptr<PlaneRequests> requests_;
   std::unique_ptr<PlaneLink> link_;
   std::unique_ptr<Planner> planner_;
@@ -90,7 +115,8 @@ Status PlaneDaemon::Start() {
   requests_ = std::make_unique<PlaneRequests>(
       std::make_unique<LineServer>(std::move(server)),
       PlaneRequests::Options{.progress_period = clock_.Real(Milliseconds(200)),
-                             .log = [](const std::string& text) { spdlog::info("{}", text); }});
+                             .log = [](const std::string& text) { spdlog::info("{}", text); },
+                             .read = [this](const auto& look) { output_->Read(look); }});
   FOCALFLEET_TRY_ASSIGN(EventSignal signal, EventSignal::Create());
   signal_ = std::make_unique<EventSignal>(std::move(signal));
   FOCALFLEET_TRY_ASSIGN(keeper_, Keeper::Create(
@@ -124,6 +150,15 @@ Status PlaneDaemon::Start() {
             else
               spdlog::error("no sector can be heard, it is tried again: {}", trouble);
           }});
+  output_ = std::make_unique<PlaneOutput>(
+      PlaneOutput::Options{.plane = plane_.get(),
+                           .dds = DdsOptionsOf(config_.dds),
+                           .started = WallTime::Now(),
+                           .metrics = MetricsServerOf(config_.metrics),
+                           .tell = [](const std::string& trouble) {
+                             if (!trouble.empty())
+                               spdlog::error("status of the plane: {}", trouble);
+                           }});
   spdlog::info("coordinator of a plane of {} units in {} sectors", plane_->layout().size(),
                plane_->sectors());
   return {};
@@ -138,6 +173,7 @@ void PlaneDaemon::Run() {
   }
   static_cast<void>(service_.Send("STOPPING=1"));
   requests_->Close();
+  output_.reset();
   link_.reset();
 }
 
@@ -171,11 +207,19 @@ void PlaneDaemon::Turn() {
       &effects);
   Perform(&effects);
   requests_->ShowProgress(Instant());
+  PlaneInstant shown = Instant();
+  if (output_->due(shown.steady))
+    output_->Read([&](const PlaneTable& table) {
+      shown.table = &table;
+      output_->Publish(shown);
+    });
   wake_at_ = std::min({effects.wake_at, requests_->wake_at(), keep_again_at_});
 }
 
 void PlaneDaemon::Perform(PlaneEffects* effects) {
   for (const std::string& line : effects->log) spdlog::info("{}", line);
+  for (const AlarmValue& alarm : alarms_.Take(effects->notes, WallTime::Now()))
+    output_->Publish(alarm);
   for (const PlaneOrder& order : effects->orders) link_->Send(order);
   if (effects->record) {
     keeping_ = {std::move(*effects->record), effects->record_number};

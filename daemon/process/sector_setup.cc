@@ -1,8 +1,11 @@
 #include "daemon/process/sector_setup.h"
 
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <string>
 #include <utility>
 
 #include "daemon/process/dds_setup.h"
@@ -15,6 +18,11 @@ void Scale(double speed, DurationNs* time) {
   time->ns = static_cast<std::int64_t>(static_cast<double>(time->ns) * std::max(1.0, speed));
 }
 
+std::string HostName() {
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "its host";
+}
+
 }  // namespace
 
 PlaneTimes PlaneTimesAt(double speed) {
@@ -22,7 +30,7 @@ PlaneTimes PlaneTimesAt(double speed) {
   for (DurationNs* time : {&times.listen, &times.takeover, &times.repeat, &times.body_repeat,
                            &times.silence, &times.gather_patience, &times.round_patience,
                            &times.confirm_window, &times.finish_patience, &times.settle_patience,
-                           &times.clock_allowance, &times.border_notice})
+                           &times.clock_allowance, &times.clock_patience, &times.border_notice})
     Scale(speed, time);
   return times;
 }
@@ -43,6 +51,7 @@ Result<std::unique_ptr<SectorSeat>> OpenSector(const DaemonConfig& config, const
   agent.sector = config.sector.number;
   agent.layout = DigestOf(layout);
   agent.start_delay = config.timing.start_delay;
+  agent.door = HostName() + ":" + config.control.socket;
   return SectorSeat::Create(
       {.agent = agent,
        .dds = DdsOptionsOf(config.dds),

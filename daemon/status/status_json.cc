@@ -333,6 +333,12 @@ std::string StateText(const FleetView& view) {
     number("x_mm", unit.x_fp_mm);
     number("y_mm", unit.y_fp_mm);
     const UnitDrive& drive = view.coordinator->drives()[n];
+    const std::optional<Pose>& target = view.coordinator->unit({n}).target;
+    const PointFp aim =
+        target ? FibreAt(view.layout->unit({n}), drive, *target) : PointFp{kNoNumber, kNoNumber};
+    fmt::format_to(out, FMT_COMPILE(",\"outcome\":\"{}\""), Name(unit.outcome));
+    number("target_x_mm", aim.x_mm);
+    number("target_y_mm", aim.y_mm);
     fmt::format_to(out, FMT_COMPILE(",\"counter1\":{},\"repeat\":{},\"mode\":\"{}\""),
                    drive.axis[0].counter1, drive.axis[0].repeat, Name(drive.mode));
     number("v_bus_V", drive.v_bus_V);

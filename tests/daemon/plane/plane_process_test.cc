@@ -1,15 +1,20 @@
-// Real daemons: a coordinator and three sectors, each with a simulated fleet of its own, on a DDS
-// domain of their own.
+// Real daemons: a coordinator and its sectors, each with a simulated fleet of its own, on a DDS
+// domain of their own, with and without DDS Security.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "daemon/control/line_client.h"
+#include "daemon/dds/status_publisher.h"
+#include "daemon/dds/status_reader.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/targets_file.h"
 #include "fleet/hex_layout.h"
@@ -24,12 +29,13 @@ namespace focalfleet {
 namespace {
 
 constexpr int kPatienceMs = 120'000;  // limit for a hang; nothing is timed
-constexpr std::uint32_t kSectors = 3;
 constexpr std::uint32_t kUnits = 36;
+constexpr std::uint32_t kBuses = 6;
 
 class PlaneProcesses : public ::testing::Test {
  protected:
-  PlaneProcesses() {
+  explicit PlaneProcesses(std::uint32_t sectors = 3, bool secured = false)
+      : sectors_(sectors), secured_(secured) {
     std::vector<Unit> units = MakeHexLayout({.count = kUnits, .units_per_bus = 6});
     std::ranges::sort(units, {}, [](const Unit& unit) { return unit.base_fp.x_mm; });
     for (std::uint32_t n = 0; n < units.size(); ++n) {
@@ -38,18 +44,36 @@ class PlaneProcesses : public ::testing::Test {
     }
     std::ofstream(scratch_ / "units.csv") << WriteUnits(units);
     layout_ = std::make_unique<Layout>(std::move(*Layout::Create(units, {})));
-    Configure("plane", "[plane]\nsectors = [\"0-1\", \"2-3\", \"4-5\"]\n");
-    for (std::uint32_t n = 0; n < kSectors; ++n)
-      Configure(Name(n), "[sector]\nnumber = " + std::to_string(n) + "\nbuses = \"" +
-                             std::to_string(2 * n) + "-" + std::to_string(2 * n + 1) + "\"\n");
+    if (secured) MakeKeys();
+    std::string list;
+    for (std::uint32_t n = 0; n < sectors; ++n)
+      list += (list.empty() ? "\"" : ", \"") + Buses(n) + "\"";
+    Configure("plane", "coordinator", "[plane]\nsectors = [" + list + "]\n");
+    for (std::uint32_t n = 0; n < sectors; ++n)
+      Configure(Name(n), "sector-" + std::to_string(n),
+                "[sector]\nnumber = " + std::to_string(n) + "\nbuses = \"" + Buses(n) + "\"\n");
     Start("plane");
-    for (std::uint32_t n = 0; n < kSectors; ++n) Start(Name(n));
+    for (std::uint32_t n = 0; n < sectors; ++n) Start(Name(n));
+  }
+  [[nodiscard]] std::string Buses(std::uint32_t sector) const {
+    const std::uint32_t each = kBuses / sectors_;
+    return std::to_string(sector * each) + "-" + std::to_string((sector + 1) * each - 1);
+  }
+  void MakeKeys() const {
+    const std::string command = MAKE_KEYS " " + Keys("") + " --domain " +
+                                std::to_string(test::OwnDomain()) + " --sectors " +
+                                std::to_string(sectors_) + " > /dev/null";
+    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+  }
+  [[nodiscard]] std::string Keys(const std::string& who) const {
+    return scratch_ / ("keys/" + who);
   }
   static std::string Name(std::uint32_t sector) { return "s" + std::to_string(sector); }
-  void Configure(const std::string& name, const std::string& role) const {
+  void Configure(const std::string& name, const std::string& who, const std::string& role) const {
     std::ofstream(scratch_ / (name + ".toml"))
         << "[store]\npath = \"" << name << ".db\"\n[control]\nsocket = \"" << name
         << ".sock\"\n[dds]\ndomain = " << test::OwnDomain()
+        << (secured_ ? "\nsecurity = \"" + Keys(who) + "\"" : std::string())
         << "\n[clock]\nspeed = 4.0\n[bus]\nport = \"simulated\"\n[journal]\nlimit_MiB = 0\n"
         << role;
   }
@@ -72,10 +96,10 @@ class PlaneProcesses : public ::testing::Test {
         [&] {
           const auto status = Ask("plane", "status");
           if (!status || (*status)["plane"]["phase"] != "idle") return false;
-          for (std::uint32_t n = 0; n < kSectors; ++n) {
+          for (std::uint32_t n = 0; n < sectors_; ++n) {
             if ((*status)["plane"]["sectors"][n]["trouble"] != "") return false;
             const auto sector = Ask(Name(n), "status");
-            if (!sector || (*sector)["phases"]["ready"] != kUnits / kSectors) return false;
+            if (!sector || (*sector)["phases"]["ready"] != kUnits / sectors_) return false;
           }
           return true;
         },
@@ -87,7 +111,7 @@ class PlaneProcesses : public ::testing::Test {
   }
   [[nodiscard]] std::string Logs() const {
     std::string all = "plane: " + Log("plane");
-    for (std::uint32_t n = 0; n < kSectors; ++n) all += "\n" + Name(n) + ": " + Log(Name(n));
+    for (std::uint32_t n = 0; n < sectors_; ++n) all += "\n" + Name(n) + ": " + Log(Name(n));
     return all;
   }
   /// Targets for all units, as a file.
@@ -106,6 +130,36 @@ class PlaneProcesses : public ::testing::Test {
     return text;
   }
 
+  /// A reader of the whole plane, until `done` with what came so far, or for long.
+  struct Seen {
+    std::set<std::uint32_t> units;
+    std::set<std::optional<std::uint32_t>> daemons;
+  };
+  static Seen Watch(const std::string& security, const std::function<bool(const Seen&)>& done,
+                    int patience_ms = kPatienceMs) {
+    Seen seen;
+    auto reader = StatusReader::Create(
+        {.dds = {.domain = test::OwnDomain(), .config_xml = {}, .security = security},
+         .units = true,
+         .partitions = AllPartitions()});
+    if (!reader) {
+      ADD_FAILURE() << reader.error().text;
+      return seen;
+    }
+    static_cast<void>(test::WaitUntil(
+        [&] {
+          StatusUpdate update;
+          EXPECT_TRUE((*reader)->Take(&update));
+          for (const UnitStatusValue& unit : update.units) seen.units.insert(unit.unit.value);
+          for (const FleetStatusValue& fleet : update.fleets) seen.daemons.insert(fleet.sector);
+          return done(seen);
+        },
+        patience_ms));
+    return seen;
+  }
+
+  const std::uint32_t sectors_;
+  const bool secured_;
   const test::ScratchFolder scratch_;
   std::unique_ptr<Layout> layout_;
   std::map<std::string, std::unique_ptr<test::Process>> processes_;
@@ -146,7 +200,81 @@ TEST_F(PlaneProcesses, CarryOutAConfigurationAndGoOnAfterKills) {
   ASSERT_TRUE(third.has_value()) << third.error().text << Logs();
   EXPECT_GT((*third)["arrived"], 0) << *third;
   EXPECT_GT((*third)["refused"], 0) << "units beside the sector that is not there stand";
-  EXPECT_EQ((*third)["left_out"], kUnits / kSectors) << *third;
+  EXPECT_EQ((*third)["left_out"], kUnits / sectors_) << *third;
+}
+
+TEST_F(PlaneProcesses, ShowTheWholePlane) {
+  ASSERT_TRUE(Stands()) << Logs();
+  // A single reader has all units, and each daemon's own status beside the coordinator's.
+  const auto whole = [this](const Seen& seen) {
+    return seen.units.size() == kUnits && seen.daemons.size() == sectors_ + 1;
+  };
+  const Seen seen = Watch({}, whole);
+  EXPECT_EQ(seen.units.size(), kUnits);
+  EXPECT_TRUE(seen.daemons.contains(std::nullopt));
+  EXPECT_TRUE(seen.daemons.contains(sectors_ - 1));
+  // The coordinator's own table has them, too.
+  const auto rows_with = [this](const char* phase, bool silent) {
+    std::size_t count = 0;
+    if (const auto state = Ask("plane", "state"))
+      for (const Json& row : (*state)["rows"])
+        count += row["phase"] == phase && row["silent"] == silent ? 1u : 0u;
+    return count;
+  };
+  EXPECT_TRUE(test::WaitUntil([&] { return rows_with("ready", false) == kUnits; }, kPatienceMs))
+      << Logs();
+  const auto unit = Ask("plane", "unit", {{"unit_id", layout_->units().back().id.value}});
+  ASSERT_FALSE(unit.has_value());
+  EXPECT_NE(unit.error().text.find("s2.sock"), std::string::npos) << unit.error().text;
+  const auto alarms = Ask("plane", "alarms");
+  ASSERT_TRUE(alarms.has_value()) << alarms.error().text;
+  EXPECT_EQ((*alarms)["open"], 0) << *alarms;
+  // A sector that ended is said to be silent, and none of its units has a place.
+  Kill("s2");
+  EXPECT_TRUE(
+      test::WaitUntil([&] { return rows_with("silent", true) == kUnits / sectors_; }, kPatienceMs))
+      << Logs();
+  EXPECT_EQ(rows_with("ready", false), kUnits - kUnits / sectors_);
+}
+
+class SecuredPlane : public PlaneProcesses {
+ protected:
+  SecuredPlane() : PlaneProcesses(2, true) {}
+};
+
+// Credentials of make-keys let each daemon of a plane do its part, and no more.
+TEST_F(SecuredPlane, WorksAndShowsItselfToMonitorsAlone) {
+  ASSERT_TRUE(Stands()) << Logs();
+  const auto done =
+      Ask("plane", "apply", {{"source", "t"}, {"targets_csv", Targets(1)}, {"wait", true}});
+  ASSERT_TRUE(done.has_value()) << done.error().text << Logs();
+  EXPECT_EQ((*done)["arrived"], kUnits) << *done << Logs();
+  const auto whole = [](const Seen& seen) {
+    return seen.units.size() == kUnits && seen.daemons.size() == 3;
+  };
+  const Seen seen = Watch(Keys("monitor"), whole);
+  EXPECT_EQ(seen.units.size(), kUnits);
+  EXPECT_EQ(seen.daemons.size(), 3u);
+  // Whoever has no credentials gets nothing in the time in which a monitor has everything.
+  const Seen nothing = Watch(
+      {}, [](const Seen&) { return false; }, 8000);
+  EXPECT_TRUE(nothing.units.empty());
+  EXPECT_TRUE(nothing.daemons.empty());
+  // A sector cannot speak as another one, nor as a coordinator.
+  const auto publish_as = [this](const char* who, const char* partition) {
+    return StatusPublisher::Create({.domain = test::OwnDomain(),
+                                    .config_xml = {},
+                                    .security = Keys(who),
+                                    .partition = partition})
+        .has_value();
+  };
+  EXPECT_TRUE(publish_as("sector-1", "sector-1"));
+  EXPECT_FALSE(publish_as("sector-1", "sector-0"));
+  EXPECT_FALSE(publish_as("sector-1", "plane"));
+  EXPECT_FALSE(publish_as("sector-1", ""));
+  EXPECT_TRUE(publish_as("coordinator", "plane"));
+  EXPECT_FALSE(publish_as("coordinator", "sector-0"));
+  EXPECT_FALSE(publish_as("monitor", "plane"));
 }
 
 TEST_F(PlaneProcesses, StopInAllSectors) {
