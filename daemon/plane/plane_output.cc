@@ -66,11 +66,10 @@ class PlaneOutput::Reader {
     NameThisThread("plane-status");
     std::mutex mutex;
     std::condition_variable_any ended;
-    std::string trouble;
     while (!stop.stop_requested()) {
       const Status status = Follow(stop);
       if (status) return;
-      if (status.error().text != trouble) tell_(trouble = status.error().text);
+      if (status.error().text != trouble_) tell_(trouble_ = status.error().text);
       std::unique_lock lock(mutex);
       ended.wait_for(lock, stop, milliseconds(5000), [] { return false; });
     }
@@ -79,6 +78,8 @@ class PlaneOutput::Reader {
     FOCALFLEET_TRY_ASSIGN(
         const auto reader,
         StatusReader::Create({.dds = dds_, .units = true, .partitions = {SectorPartition({})}}));
+    if (!trouble_.empty()) tell_("");
+    trouble_.clear();
     StatusUpdate update;
     while (!stop.stop_requested()) {
       FOCALFLEET_TRY_ASSIGN(const bool any, reader->Wait(milliseconds(200)));
@@ -96,6 +97,7 @@ class PlaneOutput::Reader {
 
   const DdsOptions dds_;
   const std::function<void(const std::string&)> tell_;
+  std::string trouble_;  // of the thread
   mutable std::mutex mutex_;
   PlaneTable table_;
   std::jthread thread_;
@@ -105,8 +107,11 @@ PlaneOutput::PlaneOutput(Options options) : options_(std::move(options)) {
   DdsOptions dds = options_.dds;
   dds.partition = kPlanePartition;
   publisher_ = std::make_unique<RenewingStatusPublisher>(RenewingStatusPublisher::Options{
-      .join = {.join = [dds] { return StatusPublisher::Create(dds); }, .tell = options_.tell}});
-  reader_ = std::make_unique<Reader>(options_.plane, options_.dds, options_.tell);
+      .join = {.join = [dds] { return StatusPublisher::Create(dds); },
+               .tell = [this](const std::string& trouble) { options_.tell("status", trouble); }}});
+  reader_ = std::make_unique<Reader>(
+      options_.plane, options_.dds,
+      [this](const std::string& trouble) { options_.tell("status of the sectors", trouble); });
   if (!options_.metrics) return;
   options_.metrics->pages = {{"/metrics", [this] { return Metrics(); }},
                              {"/healthz", [this] { return Health(); }}};

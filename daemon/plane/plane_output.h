@@ -23,8 +23,10 @@ class PlaneOutput {
     const PlaneLayout* plane = nullptr;  // outlives this
     DdsOptions dds;
     WallTime started;
-    std::optional<HttpServer::Options> metrics;                                // none: no /metrics
-    std::function<void(const std::string&)> tell = [](const std::string&) {};  // troubles of DDS
+    std::optional<HttpServer::Options> metrics;  // none: no /metrics
+    /// Receives each new reason why DDS does not do its part, and an empty text when it does again.
+    std::function<void(const char* part, const std::string& trouble)> tell =
+        [](const char*, const std::string&) {};
   };
   explicit PlaneOutput(Options options);
   PlaneOutput(const PlaneOutput&) = delete;

@@ -277,8 +277,9 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
   reader->Require(!config.bus.can_fd || config.bus.data_bit_rate_bps >= config.bus.bit_rate_bps,
                   "bus", "data_bit_rate_bps",
                   "bus.data_bit_rate_bps must not be below bus.bit_rate_bps");
-  reader->Require(config.bus.port != PortKind::kUnix || !config.bus.unix_directory.empty(), "bus",
-                  "unix_directory",
+  reader->Require(config.plane.coordinates() || config.bus.port != PortKind::kUnix ||
+                      !config.bus.unix_directory.empty(),
+                  "bus", "unix_directory",
                   "bus.unix_directory must say where bus<ID>.sock are for bus.port = \"unix\"");
   reader->Require(config.sync.chip.empty() || config.clock.speed == 1, "sync", "chip",
                   "sync.chip asks for clock.speed = 1: a pulse is one of real time");

@@ -10,6 +10,7 @@
 #include <array>
 #include <chrono>
 #include <cstdlib>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <random>
@@ -96,9 +97,14 @@ class PlaneDaemon {
   std::unique_ptr<PlaneLink> link_;
   std::unique_ptr<Planner> planner_;
   std::unique_ptr<Keeper> keeper_;
-  KeepJob keeping_;
-  std::uint64_t kept_ = 0;
-  HostInstant keep_again_at_ = kNever;
+  struct Keeping {
+    KeepJob job;
+    std::uint64_t kept = 0;  // the number of the last record that is durable
+    HostInstant again_at = kNever;
+  };
+  Keeping keeping_;
+  std::unique_ptr<DdsTroubles> troubles_;
+  std::unique_ptr<CredentialWatch> credentials_;
   HostInstant now_;
   HostInstant wake_at_{0};
   NotifySocket service_;
@@ -139,25 +145,27 @@ Status PlaneDaemon::Start() {
   coordinator_ = std::make_unique<PlaneCoordinator>(plane_.get(), PlaneTimesAt(config_.clock.speed),
                                                     content.coordinator, content.record);
   WarnOfDdsEnvironment(config_.dds);
-  link_ = std::make_unique<PlaneLink>(PlaneLink::Options{
-      .dds = DdsOptionsOf(config_.dds),
-      .sector = {},
-      .arrived = [signal_raw = signal_.get()] { signal_raw->Raise(); },
-      .tell =
-          [](const std::string& trouble) {
-            if (trouble.empty())
-              spdlog::info("the domain is joined");
-            else
-              spdlog::error("no sector can be heard, it is tried again: {}", trouble);
-          }});
+  troubles_ = std::make_unique<DdsTroubles>([signal_raw = signal_.get()] { signal_raw->Raise(); });
+  credentials_ = WatchCredentials(config_.dds, troubles_.get(), [](WallTime end) {
+    spdlog::warn(
+        "DDS: a plane's coordinator takes new credentials when it is started again, before {}",
+        ToIso8601(end));
+  });
+  link_ = std::make_unique<PlaneLink>(
+      PlaneLink::Options{.dds = DdsOptionsOf(config_.dds),
+                         .sector = {},
+                         .arrived = [signal_raw = signal_.get()] { signal_raw->Raise(); },
+                         .tell =
+                             [this](const std::string& trouble) {
+                               troubles_->Report(AlarmName::kDdsMissing, "the plane", trouble);
+                             }});
   output_ = std::make_unique<PlaneOutput>(
       PlaneOutput::Options{.plane = plane_.get(),
                            .dds = DdsOptionsOf(config_.dds),
                            .started = WallTime::Now(),
                            .metrics = MetricsServerOf(config_.metrics),
-                           .tell = [](const std::string& trouble) {
-                             if (!trouble.empty())
-                               spdlog::error("status of the plane: {}", trouble);
+                           .tell = [this](const char* part, const std::string& trouble) {
+                             troubles_->Report(AlarmName::kDdsMissing, part, trouble);
                            }});
   spdlog::info("coordinator of a plane of {} units in {} sectors", plane_->layout().size(),
                plane_->sectors());
@@ -173,6 +181,7 @@ void PlaneDaemon::Run() {
   }
   static_cast<void>(service_.Send("STOPPING=1"));
   requests_->Close();
+  credentials_.reset();
   output_.reset();
   link_.reset();
 }
@@ -180,16 +189,16 @@ void PlaneDaemon::Run() {
 void PlaneDaemon::TakeKept() {
   while (const auto kept = keeper_->Take()) {
     if (kept->status) {
-      kept_ = kept->number;
+      keeping_.kept = kept->number;
       continue;
     }
     spdlog::error("the record of the plane cannot be written, it is tried again: {}",
                   kept->status.error().text);
-    keep_again_at_ = now_ + clock_.Real(Seconds(1));
+    keeping_.again_at = now_ + clock_.Real(Seconds(1));
   }
-  if (now_ < keep_again_at_) return;
-  KeepJob again = keeping_;
-  if (keeper_->Submit(&again)) keep_again_at_ = kNever;
+  if (now_ < keeping_.again_at) return;
+  KeepJob again = keeping_.job;
+  if (keeper_->Submit(&again)) keeping_.again_at = kNever;
 }
 
 void PlaneDaemon::Turn() {
@@ -202,9 +211,12 @@ void PlaneDaemon::Turn() {
   std::vector<PlaneCommand> commands;
   requests_->Service(Instant(), &commands);
   PlaneEffects effects;
-  coordinator_->Step(
-      {.now = now_, .reports = mail.reports, .commands = commands, .plans = plans, .kept = kept_},
-      &effects);
+  coordinator_->Step({.now = now_,
+                      .reports = mail.reports,
+                      .commands = commands,
+                      .plans = plans,
+                      .kept = keeping_.kept},
+                     &effects);
   Perform(&effects);
   requests_->ShowProgress(Instant());
   PlaneInstant shown = Instant();
@@ -213,18 +225,19 @@ void PlaneDaemon::Turn() {
       shown.table = &table;
       output_->Publish(shown);
     });
-  wake_at_ = std::min({effects.wake_at, requests_->wake_at(), keep_again_at_});
+  wake_at_ = std::min({effects.wake_at, requests_->wake_at(), keeping_.again_at});
 }
 
 void PlaneDaemon::Perform(PlaneEffects* effects) {
   for (const std::string& line : effects->log) spdlog::info("{}", line);
-  for (const AlarmValue& alarm : alarms_.Take(effects->notes, WallTime::Now()))
-    output_->Publish(alarm);
+  std::vector<ShellNote> notes = troubles_->TakeNotes();
+  std::ranges::move(effects->notes, std::back_inserter(notes));
+  for (const AlarmValue& alarm : alarms_.Take(notes, WallTime::Now())) output_->Publish(alarm);
   for (const PlaneOrder& order : effects->orders) link_->Send(order);
   if (effects->record) {
-    keeping_ = {std::move(*effects->record), effects->record_number};
-    KeepJob job = keeping_;
-    if (!keeper_->Submit(&job)) keep_again_at_ = now_;
+    keeping_.job = {std::move(*effects->record), effects->record_number};
+    KeepJob job = keeping_.job;
+    if (!keeper_->Submit(&job)) keeping_.again_at = now_;
   }
   if (effects->job) {
     PlaneJob job = std::move(*effects->job);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <string>
 #include <utility>
 
@@ -51,7 +52,7 @@ Result<std::unique_ptr<SectorSeat>> OpenSector(const DaemonConfig& config, const
   agent.sector = config.sector.number;
   agent.layout = DigestOf(layout);
   agent.start_delay = config.timing.start_delay;
-  agent.door = HostName() + ":" + config.control.socket;
+  agent.door = HostName() + ":" + std::filesystem::absolute(config.control.socket).string();
   return SectorSeat::Create(
       {.agent = agent,
        .dds = DdsOptionsOf(config.dds),

@@ -24,8 +24,10 @@ double LastsAbout(PlanePhase phase) {
       return 0.4;
     case PlanePhase::kPlanning:
       return 0.1;
+    case PlanePhase::kPreparing:
+      return 0.25;
     case PlanePhase::kFinishing:
-      return 0.1;
+      return 0.02;
     default:
       return 1.2;
   }
