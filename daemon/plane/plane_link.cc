@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <condition_variable>
 #include <map>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include "daemon/dds/credential_watch.h"
 #include "daemon/dds/cyclone.h"
 #include "daemon/dds/late_join.h"
 #include "daemon/loop/thread_name.h"
@@ -22,6 +25,9 @@ using namespace dds_internal;
 namespace {
 
 constexpr std::int32_t kDepth = 16;  // messages of one sender between two turns of the thread
+
+/// Renewed credentials: both participants speak for so long, far longer than a handshake takes.
+constexpr std::chrono::seconds kBeside(10);
 
 std::string PartitionOf(std::uint32_t sector) { return SectorPartition(sector); }
 
@@ -200,18 +206,65 @@ class PlaneLink::Impl {
   };
 
   void Join() {
-    joined_ = std::make_unique<LateJoin<Joined>>(LateJoin<Joined>::Options{
-        .join = [this] { return Joined::Create(this); }, .tell = options_.tell});
+    AddJoin();
+    if (options_.dds.security.empty()) return;
+    credentials_ = std::make_unique<CredentialWatch>(CredentialWatch::Options{
+        .folder = options_.dds.security, .renew = [this](WallTime) { Renew(); }});
   }
-  [[nodiscard]] Joined* joined() const { return joined_->get(); }
-  void Leave() { joined_.reset(); }
+  void Leave() {
+    {
+      const std::lock_guard lock(joins_mutex_);
+      leaving_ = true;
+    }
+    leave_.notify_all();
+    credentials_.reset();
+    joins_.clear();
+  }
+  /// True: DDS took the message from one participant at least.
+  template <class... Args>
+  bool Send(const Args&... args) {
+    bool sent = false;
+    for (const auto& join : Joins())
+      if (Joined* const joined = join->get(); joined != nullptr) sent |= joined->Send(args...);
+    return sent;
+  }
 
  private:
+  using JoinList = std::vector<std::shared_ptr<LateJoin<Joined>>>;
+  JoinList Joins() const {
+    const std::lock_guard lock(joins_mutex_);
+    return joins_;
+  }
+  std::shared_ptr<LateJoin<Joined>> AddJoin() {
+    auto join = std::make_shared<LateJoin<Joined>>(LateJoin<Joined>::Options{
+        .join = [this] { return Joined::Create(this); }, .tell = options_.tell});
+    const std::lock_guard lock(joins_mutex_);
+    joins_.push_back(join);
+    return join;
+  }
+  /// On the thread of the watch. A participant with new credentials joins beside the old one, and
+  /// both say everything until all others have had time to find the new one.
+  void Renew() {
+    const auto next = AddJoin();
+    std::unique_lock lock(joins_mutex_);
+    const auto is_leaving = [this] { return leaving_; };
+    while (next->get() == nullptr)
+      if (leave_.wait_for(lock, std::chrono::seconds(1), is_leaving)) return;
+    if (leave_.wait_for(lock, kBeside, is_leaving)) return;
+    JoinList old = std::exchange(joins_, {next});
+    lock.unlock();
+    old.clear();
+  }
+
   Options options_;
   mutable std::mutex mutex_;
   PlaneMail mail_;
   PlaneLinkCounters counters_;
-  std::unique_ptr<LateJoin<Joined>> joined_;
+  mutable std::mutex joins_mutex_;
+  std::condition_variable leave_;
+  bool leaving_ = false;
+  JoinList joins_;  // two while credentials are renewed
+  std::unique_ptr<CredentialWatch> credentials_;
 };
 
 PlaneLink::PlaneLink(Options options) : impl_(std::make_shared<Impl>(std::move(options))) {
@@ -225,25 +278,19 @@ constexpr std::uint32_t kCoordinator = focalfleet_PLANE_COORDINATOR;
 
 void PlaneLink::Send(const PlaneOrder& order) {
   const std::string body = Encode(order);
-  Impl::Joined* const joined = impl_->joined();
-  if (joined != nullptr &&
-      joined->Send(kPlaneOrderTopic, order.sector, kCoordinator, order.epoch.number, body))
+  if (impl_->Send(kPlaneOrderTopic, order.sector, kCoordinator, order.epoch.number, body))
     impl_->CountSent(body.size());
 }
 
 void PlaneLink::Send(const SectorReport& report) {
   const std::string body = Encode(report);
-  Impl::Joined* const joined = impl_->joined();
-  if (joined != nullptr &&
-      joined->Send(kSectorReportTopic, report.sector, report.sector, report.accepted.number, body))
+  if (impl_->Send(kSectorReportTopic, report.sector, report.sector, report.accepted.number, body))
     impl_->CountSent(body.size());
 }
 
 void PlaneLink::Send(const BorderNews& news) {
   const std::string body = Encode(news);
-  Impl::Joined* const joined = impl_->joined();
-  if (joined != nullptr &&
-      joined->Send(kBorderNewsTopic, news.sector, news.sector, news.epoch.number, body))
+  if (impl_->Send(kBorderNewsTopic, news.sector, news.sector, news.epoch.number, body))
     impl_->CountSent(body.size());
 }
 

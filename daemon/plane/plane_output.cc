@@ -1,5 +1,6 @@
 #include "daemon/plane/plane_output.h"
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <stop_token>
@@ -61,6 +62,9 @@ class PlaneOutput::Reader {
     look(table_);
   }
 
+  /// The next look reads with a new participant, which gets all that is published again.
+  void Renew() { renew_ = true; }
+
  private:
   void Run(const std::stop_token& stop) {
     NameThisThread("plane-status");
@@ -68,7 +72,7 @@ class PlaneOutput::Reader {
     std::condition_variable_any ended;
     while (!stop.stop_requested()) {
       const Status status = Follow(stop);
-      if (status) return;
+      if (status) continue;
       if (status.error().text != trouble_) tell_(trouble_ = status.error().text);
       std::unique_lock lock(mutex);
       ended.wait_for(lock, stop, milliseconds(5000), [] { return false; });
@@ -81,7 +85,7 @@ class PlaneOutput::Reader {
     if (!trouble_.empty()) tell_("");
     trouble_.clear();
     StatusUpdate update;
-    while (!stop.stop_requested()) {
+    while (!stop.stop_requested() && !renew_.exchange(false)) {
       FOCALFLEET_TRY_ASSIGN(const bool any, reader->Wait(milliseconds(200)));
       if (!any) continue;
       FOCALFLEET_TRY(reader->Take(&update));
@@ -98,6 +102,7 @@ class PlaneOutput::Reader {
   const DdsOptions dds_;
   const std::function<void(const std::string&)> tell_;
   std::string trouble_;  // of the thread
+  std::atomic<bool> renew_{false};
   mutable std::mutex mutex_;
   PlaneTable table_;
   std::jthread thread_;
@@ -108,7 +113,8 @@ PlaneOutput::PlaneOutput(Options options) : options_(std::move(options)) {
   dds.partition = kPlanePartition;
   publisher_ = std::make_unique<RenewingStatusPublisher>(RenewingStatusPublisher::Options{
       .join = {.join = [dds] { return StatusPublisher::Create(dds); },
-               .tell = [this](const std::string& trouble) { options_.tell("status", trouble); }}});
+               .tell = [this](const std::string& trouble) { options_.tell("status", trouble); }},
+      .renews = !options_.dds.security.empty()});
   reader_ = std::make_unique<Reader>(
       options_.plane, options_.dds,
       [this](const std::string& trouble) { options_.tell("status of the sectors", trouble); });
@@ -138,6 +144,11 @@ void PlaneOutput::Publish(const PlaneInstant& plane) {
 }
 
 void PlaneOutput::Publish(const AlarmValue& alarm) { publisher_->Publish(alarm); }
+
+void PlaneOutput::Renew(WallTime end) {
+  publisher_->Renew(end);
+  reader_->Renew();
+}
 
 HttpAnswer PlaneOutput::Metrics() {
   const std::lock_guard lock(page_mutex_);

@@ -39,6 +39,9 @@ class PlaneOutput {
   /// Publishes what is due. Pre: `plane` has a table.
   void Publish(const PlaneInstant& plane);
   void Publish(const AlarmValue& alarm);
+  /// Participants with new credentials take the place of the old ones, which end at `end`. Any
+  /// thread may call.
+  void Renew(WallTime end);
   [[nodiscard]] bool due(SteadyTime now) const { return now >= next_; }
 
  private:

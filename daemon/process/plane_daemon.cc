@@ -146,11 +146,6 @@ Status PlaneDaemon::Start() {
                                                     content.coordinator, content.record);
   WarnOfDdsEnvironment(config_.dds);
   troubles_ = std::make_unique<DdsTroubles>([signal_raw = signal_.get()] { signal_raw->Raise(); });
-  credentials_ = WatchCredentials(config_.dds, troubles_.get(), [](WallTime end) {
-    spdlog::warn(
-        "DDS: a plane's coordinator takes new credentials when it is started again, before {}",
-        ToIso8601(end));
-  });
   link_ = std::make_unique<PlaneLink>(
       PlaneLink::Options{.dds = DdsOptionsOf(config_.dds),
                          .sector = {},
@@ -167,6 +162,9 @@ Status PlaneDaemon::Start() {
                            .tell = [this](const char* part, const std::string& trouble) {
                              troubles_->Report(AlarmName::kDdsMissing, part, trouble);
                            }});
+  // The link takes new credentials by itself.
+  credentials_ =
+      WatchCredentials(config_.dds, troubles_.get(), [this](WallTime end) { output_->Renew(end); });
   spdlog::info("coordinator of a plane of {} units in {} sectors", plane_->layout().size(),
                plane_->sectors());
   return {};

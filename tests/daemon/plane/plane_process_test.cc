@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
@@ -59,10 +60,10 @@ class PlaneProcesses : public ::testing::Test {
     const std::uint32_t each = kBuses / sectors_;
     return std::to_string(sector * each) + "-" + std::to_string((sector + 1) * each - 1);
   }
-  void MakeKeys() const {
+  void MakeKeys(const std::string& options = {}) const {
     const std::string command = MAKE_KEYS " " + Keys("") + " --domain " +
                                 std::to_string(test::OwnDomain()) + " --sectors " +
-                                std::to_string(sectors_) + " > /dev/null";
+                                std::to_string(sectors_) + " " + options + " > /dev/null";
     EXPECT_EQ(std::system(command.c_str()), 0) << command;
   }
   [[nodiscard]] std::string Keys(const std::string& who) const {
@@ -275,6 +276,42 @@ TEST_F(SecuredPlane, WorksAndShowsItselfToMonitorsAlone) {
   EXPECT_TRUE(publish_as("coordinator", "plane"));
   EXPECT_FALSE(publish_as("coordinator", "sector-0"));
   EXPECT_FALSE(publish_as("monitor", "plane"));
+}
+
+/// Credentials that end soon.
+class ShortlySecuredPlane : public PlaneProcesses {
+ protected:
+  static constexpr const char* kSeconds = "75";
+  ShortlySecuredPlane() : PlaneProcesses(2, (setenv("MAKE_KEYS_SECONDS", kSeconds, 1), true)) {
+    unsetenv("MAKE_KEYS_SECONDS");
+  }
+  ~ShortlySecuredPlane() override { unsetenv("MAKE_KEYS_SECONDS"); }
+  const std::chrono::steady_clock::time_point ended_ =
+      std::chrono::steady_clock::now() + std::chrono::seconds(76);
+};
+
+TEST_F(ShortlySecuredPlane, TakesNewCredentialsWithoutARestart) {
+  ASSERT_TRUE(Stands()) << Logs();
+  for (const char* who : {"coordinator:coordinator", "sector:sector-0", "sector:sector-1"})
+    MakeKeys(std::string("--only ") + who);
+  // Those with which the daemons have begun are over.
+  ASSERT_TRUE(
+      test::WaitUntil([this] { return std::chrono::steady_clock::now() > ended_; }, kPatienceMs));
+  ASSERT_TRUE(Stands()) << Logs();
+  const auto done =
+      Ask("plane", "apply", {{"source", "t"}, {"targets_csv", Targets(1)}, {"wait", true}});
+  ASSERT_TRUE(done.has_value()) << done.error().text << Logs();
+  EXPECT_EQ((*done)["arrived"], kUnits) << *done << Logs();
+  std::size_t ready = 0;
+  ASSERT_TRUE(test::WaitUntil(
+      [&] {
+        ready = 0;
+        if (const auto state = Ask("plane", "state"))
+          for (const Json& row : (*state)["rows"]) ready += row["silent"] == false ? 1u : 0u;
+        return ready == kUnits;
+      },
+      kPatienceMs))
+      << ready << Logs();
 }
 
 TEST_F(PlaneProcesses, StopInAllSectors) {
