@@ -11,7 +11,10 @@ namespace {
 constexpr std::array kMarginShares{0.06, 0.0};
 constexpr std::int32_t kPairTightSteps = 1;  // so near to both starts, or both targets, no margin
 constexpr std::uint64_t kWordsPerColumn = 200;  // that cost as much as one column of distances
+constexpr std::uint64_t kWordsPerLook = 5;      // at a pose before, while a way is read
+constexpr std::uint64_t kWordsPerTest = 150;    // of a step
 constexpr int kTestsMost = 20'000;              // of steps, while a way is read
+constexpr int kLooksMost = 400'000;
 
 bool IsTight(const GridPose& a, const GridPose& b) {
   return PoseGrid::StepsBetween(a, b) <= kPairTightSteps;
@@ -265,6 +268,7 @@ bool PairSearch::Read(const State& end, std::vector<State>* way) {
   dead_.clear();
   std::vector<Open> open{{end, {}, 0}};
   int tests = 0;
+  int looks = 0;
   // First all stand, then all turn as in the step after; then every other turn.
   constexpr int kTurns = 83;
   while (!open.empty() && open.back().state.step > 0) {
@@ -273,6 +277,8 @@ bool PairSearch::Read(const State& end, std::vector<State>* way) {
     bool deeper = false;
     while (here.tried < kTurns && !deeper) {
       const int turn = here.tried++;
+      work_ += kWordsPerLook;
+      if (++looks > kLooksMost) return false;
       Turns turns{};
       if (turn == 1) turns = here.last;
       if (turn > 1)
@@ -287,6 +293,7 @@ bool PairSearch::Read(const State& end, std::vector<State>* way) {
                grid_[m].Has(free_[m].In(step), here.state.at[m]);
       }
       if (!free || !Reached(before) || dead_.contains(key(before))) continue;
+      work_ += kWordsPerTest;
       if (++tests > kTestsMost) return false;
       if (!StepClear(before, here.state)) continue;
       const Turns last = turns == Turns{} ? here.last : turns;
