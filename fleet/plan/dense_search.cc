@@ -164,10 +164,11 @@ bool DenseSearch::Replan(std::uint32_t unit) {
   return is_between_[unit] != 0;
 }
 
-/// A way between things that never move may be too narrow for the grid. Pre: the unit is taken out.
+/// A way between things that never move may be too narrow for the grid, and a full rail may have no
+/// room for the grid's way. Pre: the unit is taken out.
 bool DenseSearch::ReplanBetween(std::uint32_t unit) {
   const auto near = scene_.neighbours(unit);
-  if (scene_.standing(unit).empty() &&
+  if (q_.ledger == nullptr && scene_.standing(unit).empty() &&
       std::ranges::all_of(near, [&](const NeighbourNeed& n) { return q_.movable[n.unit] != 0; }))
     return false;
   const double within_s = end_step_ * questions_.steps().step_s();
