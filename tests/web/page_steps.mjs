@@ -89,6 +89,7 @@ async function night(browser) {
   }, kMoving);
   await tab.screenshot({path: `${given.out}/moving.png`});
   await textOf(tab, "#configuration", /night-1.csv \(configuration 1\) is done/);
+  assert.equal(await tab.locator("#stop-state").innerText(), "", "the stop before it is over");
   await textOf(tab, "#configuration", `${given.count} units arrived`);
   const arrived = await tab.evaluate(() => window.focalfleetPage.fleet.outcome.every((o) => o === 2));
   assert.ok(arrived, "each unit is at its target on the plate, too");
@@ -143,6 +144,7 @@ async function night(browser) {
   await tab.screenshot({path: `${given.out}/alarm.png`});
   await alarm.getByRole("button", {name: "Mute"}).click();
   await textOf(tab, "#alarms", "Give a reason");
+  assert.match(await alarm.innerText(), /Mute all \w+/, "all alarms of this kind");
   const open = await tab.locator("#alarms li").count();
   await alarm.getByRole("button", {name: "Acknowledge"}).click();
   await tab.waitForFunction((before) =>

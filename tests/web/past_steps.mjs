@@ -135,6 +135,8 @@ export async function past(browser) {
   say("who stopped, and by which door");
   await tab.click("#commands summary");
   await textOf(tab, "#commands-list", /stop by token operator-page \(operator, http\)/);
+  const times = await tab.locator("#commands-list .event .hint").allInnerTexts();
+  assert.deepEqual(times, times.toSorted().reverse(), "the newest command first");
 
   say("nights side by side");
   await tab.click("#show-nights");

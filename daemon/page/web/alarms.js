@@ -156,7 +156,13 @@ export class Alarms {
     this.drafts.set(entry.name, draft);
     const reason = make("input", {size: 16, "aria-label": "Reason to mute",
       placeholder: "reason", value: draft.reason});
-    reason.addEventListener("input", () => { draft.reason = reason.value; });
+    reason.addEventListener("input", () => {
+      draft.reason = reason.value;
+      setText(trouble, "");
+    });
+    reason.addEventListener("keydown", (event) => {
+      if (event.key === "Enter") mute.click();
+    });
     const period = make("select", {"aria-label": "How long it is muted"},
         ...[["1 h", "3600"], ["4 h", "14400"], ["12 h", "43200"], ["until, UTC", "until"]]
           .map(([text, seconds]) => make("option", {value: seconds}, text)));
@@ -183,7 +189,7 @@ export class Alarms {
         : Number(period.value);
       await this.change(trouble, "alarms_mute", {name: entry.name, for_s,
         reason: reason.value.trim()});
-    }}, "Mute");
+    }}, `Mute all ${entry.name}`);
     return make("div", {class: "buttons"}, period, until, reason, this.access.guard(mute, "alarms_mute"),
         trouble);
   }

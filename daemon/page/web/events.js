@@ -73,6 +73,7 @@ export class Commands {
     try {
       const {entries} = await this.api.ask("audit",
           {limit: kRowsOfPage, ...(before === null ? {} : {until_ns: before})});
+      entries.reverse();  // the newest first, as all lists have it
       body.querySelector(".more")?.remove();
       if (before === null) body.replaceChildren();
       body.append(...entries.map((entry) => make("p", {class: `event ${entry.taken ? "" : "warning"}`},

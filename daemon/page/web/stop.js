@@ -7,6 +7,8 @@ export class Stop {
     this.api = api;
     this.access = access;
     this.sent = 0;
+    this.configuration = 0;  // the newest
+    this.answeredIn = null;  // the configuration that was the newest at the last stop
     find("stop").addEventListener("click", () => this.send());
     window.addEventListener("keydown", (event) => {
       const typing = event.target.matches?.("input, select, textarea");
@@ -17,7 +19,16 @@ export class Stop {
     });
   }
 
+  /** A stop is over with the next configuration: its answer beside moving units would mislead. */
+  note(configuration) {
+    this.configuration = configuration;
+    if (this.answeredIn === null || configuration === this.answeredIn) return;
+    this.answeredIn = null;
+    setText(find("stop-state"), "");
+  }
+
   async send() {
+    this.answeredIn = null;
     const number = ++this.sent;
     const say = (text, isTrouble = false) => {
       if (number !== this.sent) return;
@@ -28,6 +39,7 @@ export class Stop {
     try {
       await this.api.ask("stop");
       say(`Stop: the daemon has it (${new Date().toISOString().slice(11, 19)} UTC).`);
+      this.answeredIn = this.configuration;
     } catch (error) {
       say(`NOT STOPPED: ${error.message}. At the host: focalfleet stop --direct`, true);
       if (error.status === 401) this.access.open("Stop needs a token: any role may stop.");
