@@ -160,8 +160,9 @@ bool DenseSearch::Replan(std::uint32_t unit) {
     TakeOut(unit);
   }
   if (in_cut_ && is_between_[unit] == 0) return false;
-  is_between_[unit] = ReplanBetween(unit) ? 1 : 0;
-  return is_between_[unit] != 0;
+  if (!ReplanBetween(unit)) return false;
+  is_between_[unit] = 1;
+  return true;
 }
 
 /// A way between things that never move may be too narrow for the grid, and a full rail may have no

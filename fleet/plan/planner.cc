@@ -148,7 +148,6 @@ Result<Plan> Planner::Run() {
   if (at_once && AllAtOnce(request_.motions)) return Finish();
   FOCALFLEET_TRY(CheckWanted());
   if (at_once && options_.leave_stuck && LeaveStuck()) return Finish();
-  if (at_once && dense_ && LeaveStuckAndCallBack()) return Finish();
   FOCALFLEET_TRY(CheckWanted());
   scene_ = as_ruled;
   std::vector<Piece> order;
@@ -175,10 +174,7 @@ Result<Plan> Planner::Run() {
                    Tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s});
   FOCALFLEET_TRY_ASSIGN(
       plan_, Schedule(pieces, scene_, request_.drives, options_, ledger ? &*ledger : nullptr));
-  // Units that found no turn in the order may find a way among the others as these are planned. On
-  // a dense plate all end sooner then.
-  if (at_once && too_near_.empty() && (dense_ || !stuck_for_order_.empty()))
-    AlsoServe(stuck_for_order_, {});
+  if (at_once && too_near_.empty() && (dense_ || !stuck_for_order_.empty())) ServeTheRest();
   if (local_search_.tracks.empty()) TracksOfPlan();
   return Finish();
 }

@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <utility>
+#include <limits>
 
 #include "fleet/plan/bounds.h"
 #include "fleet/plan/dense_search.h"
@@ -20,8 +20,8 @@ constexpr double kSlackMost = 2;  // times the bound that limits of power may ta
 /// take where nothing stands for good. Units: s of CPU.
 constexpr double kCompleteCost_s = 0.03;
 constexpr double kCompleteLeast_s = 10;  // of a few units, too: two may be hooked into each other
-/// Work that each unit is worth which finds no way with all others. Units: s of CPU.
-constexpr double kCallBackCost_s = 1;
+/// Repeats with other random numbers, without limits of power.
+constexpr std::uint64_t kFreshStarts = 3;
 /// The first plan of a dense plate ends by this, times the bound.
 constexpr double kDenseWithin = 1.25;
 
@@ -29,10 +29,10 @@ constexpr double kDenseWithin = 1.25;
 
 /// Dense plates are searched by neighbourhoods, and so are others where units find no way around
 /// each other or the plan ends late.
-LocalSearchResult Planner::Search(LocalSearchRequest search, const SearchEffort& effort) const {
+LocalSearchResult Planner::Search(LocalSearchRequest search, double complete_cpu_s) const {
   const DenseSearchOptions dense{.within = kDenseWithin,
-                                 .complete_cpu_s = effort.complete_cpu_s,
-                                 .improve_cpu_s = effort.improves ? options_.improve_cpu_s : 0};
+                                 .complete_cpu_s = complete_cpu_s,
+                                 .improve_cpu_s = options_.improve_cpu_s};
   if (dense_) return SearchDense(search, dense);
   LocalSearchResult made = SearchLocally(search);
   if (made.starved || search.ledger != nullptr || !search.given.empty()) return made;
@@ -58,11 +58,13 @@ bool Planner::AbandonWalledIn() {
     };
     if (service_.goes(i) && std::any_of(near.begin(), near.end(), never_moves)) stuck_.push_back(i);
   }
-  return AbandonHopeless();
+  const bool any = AbandonHopeless();
+  stuck_.clear();
+  return any;
 }
 
 /// Plans all units at once. False: some units still meet others, and nothing is planned.
-bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with, const SearchEffort& effort) {
+bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   std::vector<std::uint8_t> may_move(service_.movable().begin(), service_.movable().end());
   if (options_.fixed)
     for (std::uint32_t i = 0; i < scene_.size(); ++i)
@@ -70,11 +72,11 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with, const SearchEffor
   std::vector<AxisPaths> paths(begin_with.begin(), begin_with.end());
   std::uint64_t fresh_starts = 0;
   double slack = 0;  // of the time with limits of power; 0: not known yet
-  SearchEffort left = effort;
-  if (!options_.power.any())
-    left.complete_cpu_s =
-        std::min(left.complete_cpu_s,
-                 std::max(kCompleteLeast_s, kCompleteCost_s * static_cast<double>(scene_.size())));
+  // Limits of power have attempts of their own, each with more time.
+  double left_cpu_s =
+      options_.power.any()
+          ? std::numeric_limits<double>::infinity()
+          : std::max(kCompleteLeast_s, kCompleteCost_s * static_cast<double>(scene_.size()));
   for (int attempt = 0; attempt < kAttemptsMax && !IsAbandoned(options_.abandoned); ++attempt) {
     service_.DropCollidingTargets();
     scene_.AllowFor(start_);
@@ -107,7 +109,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with, const SearchEffor
                                     .within_s = within_s,
                                     .seed = options_.seed + fresh_starts,
                                     .abandoned = options_.abandoned};
-    local_search_ = Search(search, left);
+    local_search_ = Search(search, left_cpu_s);
     if (local_search_.starved) break;
     if (local_search_.in_conflict.empty()) {
       PlanOfLocalSearch();
@@ -116,44 +118,27 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with, const SearchEffor
     // Some units may have no way at all: they stay, and the others are planned again.
     stuck_ = local_search_.in_conflict;
     std::erase_if(stuck_, [&](std::uint32_t i) { return !service_.is_movable(i); });
-    left.complete_cpu_s -= local_search_.work_s;
+    left_cpu_s -= local_search_.work_s;
     if (AbandonHopeless()) continue;
-    if (left.complete_cpu_s <= 0) break;
+    if (left_cpu_s <= 0) break;
     // The others may need more time within limits of power, or other random numbers.
     if (ledger) slack *= 1.1;
-    if (ledger ? slack > kSlackMost : ++fresh_starts > effort.fresh_starts) break;
+    if (ledger ? slack > kSlackMost : ++fresh_starts > kFreshStarts) break;
     if (!options_.power.any()) paths = local_search_.paths;
   }
-  tried_ = std::move(local_search_.paths);
   local_search_ = {};
   return false;
 }
 
-/// Targets that are lost where the unit rests: its own, and those of others that its resting place
-/// keeps them from.
-std::size_t Planner::LostIfAtRest(std::uint32_t unit) const {
-  Service trial = service_;
-  if (trial.goes(unit)) trial.Unserve(unit, UnservedWhy::kBlocked, kNoUnitIndex);
-  trial.DropCollidingTargets();
-  std::size_t lost = 0;
-  for (std::uint32_t i = 0; i < scene_.size(); ++i)
-    lost += service_.goes(i) && !trial.goes(i) ? 1u : 0u;
-  return lost;
-}
-
 /// Plans all units at once again, without those that made it fail. False: they are too many, or do
 /// not move; nothing has changed then.
-bool Planner::LeaveStuck(const SearchEffort& effort) {
+bool Planner::LeaveStuck() {
   constexpr int kTimes = 8;
   const Service before = service_;
   for (int time = 0; time < kTimes && !stuck_.empty(); ++time) {
-    // Only one unit of each cluster rests at a time, the one that costs fewest targets: with it at
-    // rest the others may find a way.
-    std::vector<std::pair<std::size_t, std::uint32_t>> order;
-    for (const std::uint32_t i : stuck_) order.emplace_back(LostIfAtRest(i), i);
-    std::sort(order.begin(), order.end());
+    // Only one unit of each cluster rests at a time: with it at rest the others may find a way.
     std::vector<std::uint8_t> stays(scene_.size(), 0);
-    for (const auto& [lost, i] : order) {
+    for (const std::uint32_t i : stuck_) {
       const auto near = scene_.neighbours(i);
       const auto is_at_rest = [&](const NeighbourNeed& n) { return stays[n.unit] != 0; };
       if (std::any_of(near.begin(), near.end(), is_at_rest)) continue;
@@ -162,53 +147,23 @@ bool Planner::LeaveStuck(const SearchEffort& effort) {
       service_.Hold(i);
     }
     stuck_.clear();
-    if (AllAtOnce(dense_ ? tried_ : request_.motions, effort)) return true;
+    if (AllAtOnce(request_.motions)) return true;
   }
   service_ = before;
   return false;
 }
 
-std::vector<AxisPaths> Planner::PathsOfPlan() const {
+/// Plans units that found no turn in the order among the others as these are planned. On a dense
+/// plate all end sooner then.
+void Planner::ServeTheRest() {
+  const Service before = service_;
+  const Plan ordered = plan_;
   std::vector<AxisPaths> paths(scene_.size());
   for (const UnitPlan& move : plan_.moves) paths[move.unit.value] = move.path;
-  return paths;
-}
-
-/// Plans as AllAtOnce, with these units served again. False: nothing has changed.
-bool Planner::AlsoServe(std::span<const std::uint32_t> units, const SearchEffort& effort) {
-  const Service service = service_;
-  const Plan plan = plan_;
-  LocalSearchResult found = local_search_;
-  for (const std::uint32_t i : units) service_.Readmit(i);
-  if (AllAtOnce(PathsOfPlan(), effort)) return true;
-  service_ = service;
-  plan_ = plan;
-  local_search_ = std::move(found);
-  return false;
-}
-
-/// Plans a dense plate without the units that make the search fail, then each of them among the
-/// others as these are planned. False: nothing has changed.
-bool Planner::LeaveStuckAndCallBack() {
-  const Service before = service_;
-  constexpr SearchEffort kLittle{
-      .fresh_starts = 0, .complete_cpu_s = kCallBackCost_s, .improves = false};
-  if (!LeaveStuck(kLittle)) return false;
-  const auto is_left = [&](std::uint32_t unit) {
-    return before.goes(unit) && !service_.goes(unit);
-  };
-  for (std::uint32_t i = 0; i < scene_.size(); ++i)
-    if (is_left(i)) AlsoServe({&i, 1}, kLittle);
-  // A unit at rest may be what keeps another one from its target.
-  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
-    if (!is_left(i)) continue;
-    std::vector<std::uint32_t> together{i};
-    for (const NeighbourNeed& near : scene_.neighbours(i))
-      if (is_left(near.unit)) together.push_back(near.unit);
-    if (together.size() > 1) AlsoServe(together, kLittle);
-  }
-  AlsoServe({}, {});
-  return true;
+  for (const std::uint32_t i : stuck_for_order_) service_.Readmit(i);
+  if (AllAtOnce(paths)) return;
+  service_ = before;
+  plan_ = ordered;
 }
 
 void Planner::PlanOfLocalSearch() {

@@ -1,15 +1,13 @@
 // The planner at work on one request. Its phases share what they know of the request, of who is
 // served, and of the plan so far:
 //
-//   all at once   everyone gets a way in the same search; those that find none rest, and are called
-//                 back one after the other (planner_at_once.cc)
+//   all at once   everyone gets a way in the same search (planner_at_once.cc)
 //   an order      one after the other, through the cells, for what the search does not bring to an
-//                 end (planner_order.cc)
+//                 end (planner_order.cc); the search begins with it once more
 //   the end       bounds, followers and nearest pairs of the plan (planner.cc)
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -28,13 +26,6 @@ namespace focalfleet {
 /// After so many attempts the fleet is planned with what can be served without moving any unit
 /// aside.
 inline constexpr int kAttemptsMax = 60;
-
-/// How much one search of all units at once may do.
-struct SearchEffort {
-  std::uint64_t fresh_starts = 3;  // with other random numbers
-  double complete_cpu_s = std::numeric_limits<double>::infinity();  // DenseSearchOptions
-  bool improves = true;
-};
 
 class Planner {
  public:
@@ -56,14 +47,10 @@ class Planner {
   bool LetStepAside(std::uint32_t stuck);
   [[nodiscard]] Status CheckWanted() const;
   [[nodiscard]] double MeanNeighbours() const;
-  [[nodiscard]] LocalSearchResult Search(LocalSearchRequest search,
-                                         const SearchEffort& effort) const;
-  bool AllAtOnce(std::span<const AxisPaths> begin_with, const SearchEffort& effort = {});
-  [[nodiscard]] std::size_t LostIfAtRest(std::uint32_t unit) const;
-  bool LeaveStuck(const SearchEffort& effort = {});
-  bool AlsoServe(std::span<const std::uint32_t> units, const SearchEffort& effort);
-  bool LeaveStuckAndCallBack();
-  [[nodiscard]] std::vector<AxisPaths> PathsOfPlan() const;
+  [[nodiscard]] LocalSearchResult Search(LocalSearchRequest search, double complete_cpu_s) const;
+  bool AllAtOnce(std::span<const AxisPaths> begin_with);
+  bool LeaveStuck();
+  void ServeTheRest();
   void PlanOfLocalSearch();
   void TracksOfPlan();
   void FindBounds();
@@ -85,7 +72,6 @@ class Planner {
   std::vector<std::uint32_t> stuck_for_order_;  // given up though a way exists
   bool dense_ = false;
   LocalSearchResult local_search_;  // tracks of plan_
-  std::vector<AxisPaths> tried_;    // by the last search that failed
   Plan plan_;
 };
 
