@@ -238,7 +238,7 @@ class Page {
 
   showFacts() {
     const {facts} = this.fleet;
-    this.stop.note(facts.configuration?.id ?? 0);
+    this.stop.note(facts.configuration);
     const counts = facts.phases.map((count, p) => [kPhases[p], count])
       .filter(([, count]) => count > 0).sort((a, b) => b[1] - a[1]);
     setText(find("fleet-summary"), `${counted(facts.units, "unit")}: ` +

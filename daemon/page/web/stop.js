@@ -19,10 +19,10 @@ export class Stop {
     });
   }
 
-  /** A stop is over with the next configuration: its answer beside moving units would mislead. */
-  note(configuration) {
-    this.configuration = configuration;
-    if (this.answeredIn === null || configuration === this.answeredIn) return;
+  /** A stop is over once a later configuration moves: its answer beside it would mislead. */
+  note({id, state}) {
+    this.configuration = id;
+    if (this.answeredIn === null || id === this.answeredIn || state !== "moving") return;
     this.answeredIn = null;
     setText(find("stop-state"), "");
   }
