@@ -56,8 +56,6 @@ struct Picture {
     return at == daemons.end() ? nullptr : &at->second;
   }
 };
-/// A daemon says once a second how its fleet is. Three times that is no delay of a busy host.
-constexpr milliseconds kSilentAfter(3000);
 /// Without a coordinator nobody says how many sectors there are.
 constexpr milliseconds kSettled(2000);
 constexpr std::size_t kAlarmsShown = 8;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -17,6 +18,9 @@ namespace focalfleet {
 /// The sector of a plane whose daemon says it; none: a daemon of its own. A reader of several
 /// partitions alone fills it in.
 using SectorOfValue = std::optional<std::uint32_t>;
+
+/// A daemon says once a second how its fleet is. Three times that is no delay of a busy host.
+inline constexpr std::chrono::milliseconds kSilentAfter(3000);
 
 inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 inline constexpr std::size_t kWitnessCount = 5;

@@ -11,9 +11,6 @@
 namespace focalfleet {
 namespace {
 
-/// A sector says once a second how its fleet is. Three times that is no delay of a busy host.
-constexpr std::chrono::milliseconds kSilentAfter(3000);
-
 void PutNumber(const char* name, double value, fmt::appender out) {
   if (std::isfinite(value))
     fmt::format_to(out, FMT_COMPILE(",\"{}\":{}"), name, value);

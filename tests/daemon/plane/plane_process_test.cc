@@ -256,7 +256,7 @@ TEST_F(SecuredPlane, WorksAndShowsItselfToMonitorsAlone) {
   const Seen seen = Watch(Keys("monitor"), whole);
   EXPECT_EQ(seen.units.size(), kUnits);
   EXPECT_EQ(seen.daemons.size(), 3u);
-  // Whoever has no credentials gets nothing in the time in which a monitor has everything.
+  // A reader without credentials gets nothing in the time in which a monitor has everything.
   const Seen nothing = Watch(
       {}, [](const Seen&) { return false; }, 8000);
   EXPECT_TRUE(nothing.units.empty());
