@@ -80,6 +80,16 @@ void AlarmBook::Raise(AlarmName name, std::optional<PositionerIndex> unit, std::
   fold_at_ = std::min(fold_at_, step_.now + kFoldedLasts);
 }
 
+void AlarmBook::Explain(AlarmName name, PositionerIndex unit, std::string text) {
+  const Condition alarm{name, layout_.unit(unit).id, {}};
+  if (!conditions_.contains(alarm)) return;
+  const auto at = repeats_.find(alarm);
+  if (at != repeats_.end() && at->second.folded > 0)
+    at->second.text = std::move(text);
+  else
+    NoteAlarm(alarm, std::move(text), 0);
+}
+
 void AlarmBook::NoteAlarm(const Condition& alarm, std::string text, std::uint32_t times) {
   Note(AlarmRow{.id = next_alarm_++,
                 .severity = KindOf(alarm.name).severity,

@@ -27,6 +27,9 @@ class AlarmBook {
   /// Notes an alarm, now or folded into a later one, with the severity of its name.
   void Raise(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
              std::string text);
+  /// The alarm of a condition that lasts has a better text now. The text is noted without counting
+  /// the alarm again; a folded one takes it along.
+  void Explain(AlarmName name, PositionerIndex unit, std::string text);
   /// The condition of an alarm has ended, if it was one. Cost: a look-up among lasting conditions.
   void End(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus);
   /// Whether the condition of an alarm lasts.

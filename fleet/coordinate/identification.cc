@@ -156,9 +156,16 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
                                     Name(result.knowledge[0].witness) + ", " + result.reason);
   if (reading.status.state == UnitState::kFault) {
     fleet.units.SetPhase(i, kFault);
-    if (!fleet.ledger.alarms().Lasts(AlarmName::kUnitFault, i))
-      fleet.ledger.alarms().Raise(AlarmName::kUnitFault, i, {},
-                                  fleet.units.NameOf(i) + " is in fault");
+    const FaultCode code = reading.status.fault;
+    if (fleet.ledger.alarms().Lasts(AlarmName::kUnitFault, i)) {
+      NameFault(fleet, i, code);
+    } else {
+      fleet.ledger.alarms().Raise(
+          AlarmName::kUnitFault, i, {},
+          fleet.units.NameOf(i) + " is in fault" +
+              (code == FaultCode::kNone ? "" : std::string(": ") + Name(code)));
+      record.trouble.named_fault = code;
+    }
     fleet.units.Report(i, UnitEventKind::kLost, "is in fault");
     return;
   }
@@ -277,6 +284,15 @@ void Identify(const Coordination& fleet, PositionerIndex i) {
   AskNext(fleet, i);
 }
 
+void NameFault(const Coordination& fleet, PositionerIndex i, FaultCode fault) {
+  std::optional<FaultCode>& named = fleet.units[i].trouble.named_fault;
+  if (fault == FaultCode::kNone || !fleet.ledger.alarms().Lasts(AlarmName::kUnitFault, i)) return;
+  if (named && *named != fault)
+    fleet.ledger.alarms().Explain(AlarmName::kUnitFault, i,
+                                  fleet.units.NameOf(i) + " is in fault: " + Name(fault));
+  named = fault;
+}
+
 void Lose(const Coordination& fleet, PositionerIndex i, UnitPhase phase, const std::string& reason,
           bool alarm) {
   UnitRecord& record = fleet.units[i];
@@ -295,6 +311,7 @@ void Lose(const Coordination& fleet, PositionerIndex i, UnitPhase phase, const s
   fleet.units.SetPhase(i, phase);
   record.next_poll = fleet.now() + fleet.config.identify_period;
   fleet.timers.Set(i, record.next_poll);
+  if (phase == kFault) record.trouble.named_fault = FaultCode::kNone;
   if (alarm)
     fleet.ledger.alarms().Raise(
         phase == kSilent ? AlarmName::kUnitSilent : AlarmName::kUnitFault, i, {},

@@ -31,6 +31,10 @@ void OnVector(const Coordination& fleet, PositionerIndex i, const VectorReply& v
 void Lose(const Coordination& fleet, PositionerIndex i, UnitPhase phase, const std::string& reason,
           bool alarm = true);
 
+/// The alarm of a unit in fault says which fault it is, as soon as that is known: the report of a
+/// motion's end does not know it. Nothing where there is no such alarm.
+void NameFault(const Coordination& fleet, PositionerIndex i, FaultCode fault);
+
 /// Binds the serial number that answers at the place to it, and reads the unit anew.
 Status Adopt(const Coordination& fleet, PositionerIndex i);
 

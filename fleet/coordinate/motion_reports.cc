@@ -144,10 +144,14 @@ void OnStatus(const Coordination& fleet, PositionerIndex i, const StatusReply& s
     OnMotionStatus(fleet, i, status);
   } else if (status.restarted || status.host_lost ||
              (view.phase == kFault) != (status.state == UnitState::kFault)) {
-    if (view.phase == kReady && status.state == UnitState::kFault)
+    if (view.phase == kReady && status.state == UnitState::kFault) {
       Lose(fleet, i, kFault, std::string("reports fault ") + Name(status.fault));
-    else
+      record.trouble.named_fault = status.fault;
+    } else {
       Identify(fleet, i);
+    }
+  } else if (view.phase == kFault) {
+    NameFault(fleet, i, status.fault);
   } else if (view.phase == kReady) {
     fleet.requests.Ask(i, ClockRequest{});
   }

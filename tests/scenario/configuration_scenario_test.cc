@@ -205,6 +205,10 @@ TEST(Configuration, FaultInMotionStopsWhoDependsOnItAndTheOthersArriveLater) {
   EXPECT_EQ(fleet.coordinator().unit({3}).outcome, TargetOutcome::kFailed);
   EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kFault);
   EXPECT_EQ(fleet.coordinator().unit({3}).knowledge[0].witness, Witness::kReported);
+  fleet.Run(Seconds(5));
+  EXPECT_TRUE(
+      HasAlarm(fleet, std::string("unit 4 is in fault: ") + Name(FaultCode::kOverTemperature)))
+      << "the end of its motion did not know which fault";
   ExpectOthersArrive(&fleet, 4);
 }
 
