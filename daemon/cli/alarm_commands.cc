@@ -93,9 +93,10 @@ std::string DescribeLine(const Line& line, bool colour_on) {
 }
 
 std::string DescribeMute(const Json& mute) {
-  return fmt::format("muted  {} until {} by {}: {} ({} open)\n", TextIn(mute, "name"),
+  const std::uint64_t since = CountIn(mute, "open_since");
+  return fmt::format("muted  {} until {} by {}: {} ({} open{})\n", TextIn(mute, "name"),
                      TextIn(mute, "until"), UserIn(mute, "by"), TextIn(mute, "reason"),
-                     CountIn(mute, "open"));
+                     CountIn(mute, "open"), since > 0 ? fmt::format(", {} since", since) : "");
 }
 
 std::string DescribeAlarms(const Json& answer, bool all, bool colour_on) {

@@ -34,13 +34,30 @@ Json JsonOf(const OpenAlarmRow& row, bool muted) {
           {"runbook", RunbookOf(row.name)}};
 }
 
-Json JsonOf(const MuteRow& row, std::size_t open) {
+/// Alarms of the muted name that are open, and those of them that have begun since it was muted.
+struct MutedCounts {
+  std::size_t open = 0;
+  std::size_t since = 0;
+};
+
+MutedCounts CountMuted(const std::vector<OpenAlarmRow>& lasting, const MuteRow& mute) {
+  MutedCounts counts;
+  for (const OpenAlarmRow& row : lasting) {
+    if (row.name != mute.name || row.state != OpenAlarmRow::State::kOpen) continue;
+    ++counts.open;
+    if (row.first_unix_ns > mute.since_unix_ns) ++counts.since;
+  }
+  return counts;
+}
+
+Json JsonOf(const MuteRow& row, const MutedCounts& counts) {
   return {{"name", Name(row.name)},
           {"since", ToIso8601({row.since_unix_ns})},
           {"until", ToIso8601({row.until_unix_ns})},
           {"reason", row.reason},
           {"by", row.by},
-          {"open", open}};
+          {"open", counts.open},
+          {"open_since", counts.since}};
 }
 
 Json AlarmsJson(const std::vector<OpenAlarmRow>& rows, Severity least, const AlarmRegister& alarms,
@@ -51,10 +68,7 @@ Json AlarmsJson(const std::vector<OpenAlarmRow>& rows, Severity least, const Ala
   Json mutes = Json::array();
   const std::vector<OpenAlarmRow> lasting = alarms.Lasting();
   for (const MuteRow& mute : alarms.Mutes(now))
-    mutes.push_back(JsonOf(
-        mute, static_cast<std::size_t>(std::ranges::count_if(lasting, [&](const OpenAlarmRow& row) {
-          return row.name == mute.name && row.state == OpenAlarmRow::State::kOpen;
-        }))));
+    mutes.push_back(JsonOf(mute, CountMuted(lasting, mute)));
   const AlarmRegister::Counts counts = alarms.Count(now);
   return {{"open", counts.open},
           {"muted", counts.muted},

@@ -40,7 +40,8 @@ TEST_F(DaemonCommands, AlarmsOfOneNameAreOneLineWithTheirUnits) {
          {"until", "2026-11-26T21:00:00.000Z"},
          {"reason", "repair"},
          {"by", "uid 4294967294"},
-         {"open", 1}}}}};
+         {"open", 3},
+         {"open_since", 2}}}}};
   const auto text = Ask({"alarms"}, {{"alarms", {.result = answer}}});
   EXPECT_EQ(text.exit, 0) << text.err;
   EXPECT_THAT(text.out, HasSubstr("3 units (7-9), the newest: text of 3"));
@@ -49,7 +50,7 @@ TEST_F(DaemonCommands, AlarmsOfOneNameAreOneLineWithTheirUnits) {
   EXPECT_THAT(text.out, HasSubstr("docs/runbook.md#x"));
   EXPECT_THAT(text.out, Not(HasSubstr("text of 5")));
   EXPECT_THAT(text.out, HasSubstr("muted  UnitFault until 2026-11-26T21:00:00.000Z by uid "
-                                  "4294967294: repair (1 open)"));
+                                  "4294967294: repair (3 open, 2 since)"));
   EXPECT_EQ(requests_.at(0).args, (Json{{"all", false}}));
   EXPECT_THAT(Ask({"alarms", "--all"}, {{"alarms", {.result = answer}}}).out,
               HasSubstr("text of 5"));

@@ -5,6 +5,8 @@
 
 #include <variant>
 
+#include "daemon/verbs/alarm_requests.h"
+
 namespace focalfleet {
 namespace {
 
@@ -115,6 +117,23 @@ TEST(AlarmRegister, AMuteEndsByItself) {
   EXPECT_TRUE(alarms.Unmute("UnitSilent", "", Later(2)));
   EXPECT_EQ(alarms.Count(Later(2)).muted, 0u);
   EXPECT_EQ(alarms.Unmute("UnitSilent", "", Later(2)).error().code, ErrorCode::kRefused);
+}
+
+TEST(AlarmRegister, WhatBeginsAfterAMuteIsMutedAndCounted) {
+  AlarmRegister alarms;
+  Taken(&alarms, {Alarm(1, AlarmName::kUnitSilent, UnitId{7})});
+  ASSERT_TRUE(alarms.Mute("UnitSilent", Later(60), "repair", "uid 7", Later(1)));
+  Taken(&alarms,
+        {Alarm(2, AlarmName::kUnitSilent, UnitId{7}), Alarm(3, AlarmName::kUnitSilent, UnitId{9}),
+         Alarm(4, AlarmName::kBusDown, {}, BusId{3})},
+        Later(2));
+  const auto reading = AskAlarms({.verb = "alarms"}, alarms, Later(3));
+  ASSERT_TRUE(reading);
+  const auto answer = (*reading)(nullptr);
+  ASSERT_TRUE(answer);
+  ASSERT_EQ((*answer)["mutes"].size(), 1u);
+  EXPECT_EQ((*answer)["mutes"][0]["open"], 2);
+  EXPECT_EQ((*answer)["mutes"][0]["open_since"], 1) << "unit 9; unit 7 stood then";
 }
 
 TEST(AlarmRegister, AMuteWantsANameAnEndAndAReason) {
