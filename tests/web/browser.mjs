@@ -9,6 +9,7 @@ const require = createRequire(`${given.nodeFolder}/`);
 const {chromium} = require("playwright-core");
 const kPatience_ms = 60_000;  // limit for a hang; nothing is timed
 const kLoads = 5;
+const kReady = 3;             // frames.js, kPhases
 export const kMoving = 3;     // colours.js, State
 const kBegun_ms = 300;        // the start comes 0.25 s of the fleet's time after the signal
 
@@ -88,6 +89,12 @@ export async function textOf(tab, selector, pattern) {
     assert.fail(`${selector} does not say ${pattern}, but: ${there.join(" | ")}`);
   }
   return found.innerText();
+}
+
+/** All units are heard, and none is on its way. */
+export async function untilAllStand(tab) {
+  await tab.waitForFunction((ready) => window.focalfleetPage.fleet.phase.every((phase) =>
+    phase === ready), kReady);
 }
 
 /** Units have begun to move. */

@@ -3,6 +3,7 @@
 import {readFileSync} from "node:fs";
 import {armStop, assert, axeFindings, coloursOf, dropFile, given, isLive, kMoving, openTab, signIn,
   textOf, withBrowser, world} from "./browser.mjs";
+import {calm} from "./calm_steps.mjs";
 import {heap} from "./heap_steps.mjs";
 import {past, study, tabs} from "./past_steps.mjs";
 import {tasks} from "./task_steps.mjs";
@@ -40,7 +41,7 @@ async function night(browser) {
   say("a viewer looks on, and cannot move anything");
   await signIn(tab, "viewer");
   await isLive(tab);
-  await textOf(tab, "#fleet-summary", `${given.count} units: ${given.count} ready`);
+  await textOf(tab, "#fleet-summary", `${given.count} units: ${given.count} standing`);
   await dropFile(tab, "targets.csv", targets());
   await textOf(tab, "#preview", "takes the role operator; you are viewer");
   assert.deepEqual(sent.filter((verb) => verb === "preview" || verb === "apply"), []);
@@ -117,6 +118,9 @@ async function night(browser) {
   await tab.fill("#find-id", "7");
   await tab.press("#find-id", "Enter");
   await textOf(tab, "#unit tbody", /arrived/);
+  const overEdge = await tab.locator("#unit").evaluate((card) => Math.max(...[...card.querySelectorAll(
+    "table")].map((table) => table.getBoundingClientRect().right)) - card.getBoundingClientRect().right);
+  assert.ok(overEdge <= 0, `the moves run over the card by ${overEdge} px`);
   assert.match(await tab.locator("#unit").innerText(), /theta[\s\S]*phi[\s\S]*node/);
   assert.ok(await tab.locator("#beside button").count() >= 2);
   await tab.click("#unit summary:has-text('Parameters')");
@@ -128,7 +132,7 @@ async function night(browser) {
 
   say("what happened, newest first");
   await tab.click("#events summary");
-  await textOf(tab, "#events-list", /night-2.csv.*is stopped/);
+  await textOf(tab, "#events-list", /UTC .*night-2.csv.*is stopped/);
 
   say("an alarm: the runbook's words, mute with a reason, acknowledge");
   await tab.click("#sound");
@@ -210,6 +214,7 @@ async function looks(browser) {
       await tab.screenshot({path: `${given.out}/${name}-${colorScheme}.png`});
       await sheets(tab, `${name}-${colorScheme}`, name === "desktop" || colorScheme === "dark");
       if (name === "phone") await player(tab, colorScheme);
+      if (name === "phone") await backToPlate(tab);
       if (name === "desktop") await closer(tab, colorScheme);
       assert.deepEqual(tab.faults, []);
       await tab.context().close();
@@ -245,6 +250,22 @@ async function player(tab, colorScheme) {
   await tab.click("#player-close");
 }
 
+/** From the end of a tall page the plate is one tap away, and stop is there all the time. */
+async function backToPlate(tab) {
+  await tab.evaluate(() => window.scrollTo(0, document.documentElement.scrollHeight));
+  const inView = (selector) => tab.locator(selector).evaluate((element) => {
+    const {top, bottom} = element.getBoundingClientRect();
+    return top >= 0 && top < window.innerHeight / 2 || bottom <= window.innerHeight && top > 0;
+  });
+  assert.ok(await tab.evaluate(() => window.scrollY) > 300, "the page is tall");
+  assert.ok(await inView("#stop"));
+  assert.ok(await inView("#show-plate"));
+  assert.ok(!await inView("#plate"));
+  await tab.click("#show-plate");
+  assert.ok(await inView("#plate"));
+  assert.ok(await inView("#stop"));
+}
+
 /** Pictures of the near view, a preview, and other colours. */
 async function closer(tab, colorScheme) {
   await tab.fill("#find-id", "2500");
@@ -267,7 +288,7 @@ async function closer(tab, colorScheme) {
   await tab.screenshot({path: `${given.out}/preview-${colorScheme}.png`});
 }
 
-const scenarios = {night, looks, past, study, tabs, tasks, heap};
+const scenarios = {night, looks, past, study, tabs, tasks, calm, heap};
 await withBrowser((browser) => scenarios[given.scenario](browser));
 say("done");
 process.exit(0);

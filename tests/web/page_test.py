@@ -2,8 +2,8 @@
 
   page_test.py PROGRAMS NODE_FOLDER OUT_FOLDER SCENARIO
 
-SCENARIO: night, looks, past, study, tabs, tasks or heap. The steps are in page_steps.mjs, past_steps.mjs, task_steps.mjs and heap_steps.mjs; they
-ask here for what the world around the page does: the daemon ends, comes back, a bus dies.
+SCENARIO: night, looks, past, study, tabs, tasks, calm or heap. The steps are in page_steps.mjs, past_steps.mjs, task_steps.mjs, calm_steps.mjs and
+heap_steps.mjs; they ask here for what the world around the page does: the daemon ends, comes back, a bus dies.
 """
 
 import csv
@@ -17,7 +17,7 @@ from web_fleet import WebFleet
 
 DAY_NS = 86_400_000_000_000
 HERE = pathlib.Path(__file__).resolve().parent
-COUNTS = {"night": 120, "looks": 5000, "past": 120, "study": 19, "tabs": 37, "tasks": 120, "heap": 1000}
+COUNTS = {"night": 120, "looks": 5000, "past": 120, "study": 19, "tabs": 37, "tasks": 120, "calm": 120, "heap": 1000}
 PLACES = {"tabs": 3}  # for viewers
 
 
@@ -37,6 +37,8 @@ def world(fleet, line):
         fleet.start_daemon("heard")
     elif word == "fault":
         fleet.sim("fault", "--units", arguments[0], "--code", "over_temperature")
+    elif word == "silence":
+        fleet.sim("silence", "--units", arguments[0])
     elif word == "revoke":
         fleet.cli("token", "revoke", arguments[0], "--file", "tokens.csv")
     elif word == "targets":  # from where the units stand now

@@ -2,7 +2,7 @@
 
 import {readFileSync} from "node:fs";
 import {armStop, assert, axeFindings, coloursOf, dropFile, given, isLive, openTab, signIn, textOf,
-  world} from "./browser.mjs";
+  untilAllStand, world} from "./browser.mjs";
 
 const targets = () => readFileSync(given.targets, "utf8");
 const say = (text) => process.stdout.write(`${text}\n`);
@@ -36,7 +36,7 @@ export async function past(browser) {
   const tab = await openTab(browser);
   await signIn(tab, "operator");
   await isLive(tab);
-  await textOf(tab, "#fleet-summary", `${given.count} ready`);
+  await untilAllStand(tab);
 
   say("a preview in motion: the plan's rows on the plate, and nothing moves");
   const before = await fibres(tab);
@@ -47,7 +47,7 @@ export async function past(browser) {
   assert.ok(apart(before, await fibres(tab)) < 0.01, "it begins where the units stand");
   await seek(tab, 0.5);
   assert.ok(apart(before, await fibres(tab)) > 1, "units are on their way");
-  await textOf(tab, "#legend", /[1-9]\d*moves/);
+  await textOf(tab, "#legend", /[1-9]\d*moving/);
   await tab.selectOption("#theme", "power");
   await textOf(tab, "#legend", /[1-9]\d*one turns|[1-9]\d*both turn/);
   await tab.selectOption("#theme", "state");
@@ -70,9 +70,11 @@ export async function past(browser) {
   await armStop(tab);
   await apply(tab, "night-2.csv");
   await textOf(tab, "#configuration", /night-2.csv \(configuration 2\) is stopped/);
-  await textOf(tab, "#fleet-summary", `${given.count} ready`);  // all have said where they stand
+  await untilAllStand(tab);  // all have said where they stand
   await tab.waitForFunction(() => window.focalfleetPage.plate.turning.size === 0);
   const stoppedAt = await fibres(tab);
+  await textOf(tab, "#configuration", /\d+ stopped[\s\S]*Stopped/);
+  assert.doesNotMatch(await tab.locator("#configuration").innerText(), /Not served/);
 
   say("replay by the plan's rows");
   await openEarlier(tab);
@@ -106,11 +108,13 @@ export async function past(browser) {
   say("what was stopped goes evenly, and the page says so");
   await tab.getByRole("button", {name: "Replay configuration 2"}).click();
   await textOf(tab, "#player-title", "configuration 2");
+  await textOf(tab, "#player-unit", /Unit 7: (stopped|arrived) .* after it was applied/);  // still selected
+  await textOf(tab, "#unit-film", /In the replay\s*Unit 7: (stopped|arrived)[\s\S]*Live now/);
   await textOf(tab, "#player-note", /even motion from beginning to end|Even motion between/);
   await seek(tab, 1);
   assert.ok(apart(stoppedAt, await fibres(tab)) < 0.05, "it ends where the units were stopped");
   await textOf(tab, "#replay-trouble", /\d+ stopped/);
-  await textOf(tab, "#legend", /ready0moves/);
+  await textOf(tab, "#legend", /ready0moving/);
   await tab.screenshot({path: `${given.out}/replay.png`});
 
   say("stop works meanwhile, and live is back at a press");
@@ -118,6 +122,7 @@ export async function past(browser) {
   await textOf(tab, "#stop-state", "the daemon has it");
   await tab.click("#player-close");
   assert.ok(await tab.locator("#player").isHidden());
+  assert.equal(await tab.locator("#unit-film").innerText(), "");
 
   say("a new daemon still has the rows of the plan");
   await world("stop-daemon");
@@ -143,7 +148,28 @@ export async function past(browser) {
   await tab.locator("#nights-table tbody td").first().waitFor();
   const cells = await tab.locator("#nights-table tbody tr").first().locator("td").allInnerTexts();
   assert.deepEqual(cells.slice(0, 3), ["2", "1", String(2 * given.count)]);
-  await tab.click("#show-plate");
+  assert.match(cells[4], /^[1-9]\d*$/, "units that were stopped");
+  assert.equal(cells[5], "0", "and none that was not served");
+
+  say("the table goes on while it is open; a disabled unit is in its replay, and marked");
+  await world("disable 5");
+  await world("targets 9");
+  await apply(tab, "night-3.csv");
+  await textOf(tab, "#nights-table tbody tr:first-child td:nth-child(2)", /^3$/);
+  await textOf(tab, "#configuration", /night-3.csv \(configuration 3\) is done/);
+  await tab.getByRole("button", {name: "Replay configuration 3"}).click();
+  await textOf(tab, "#player-note", "1 unit took no part, disabled now: shown as now.");
+  await seek(tab, 1);
+  const disabled = await tab.evaluate(() => {
+    const {plate, fleet} = window.focalfleetPage;
+    const u = fleet.placeOf.get(5);
+    return [plate.state[u], plate.fibre_x[u]];
+  });
+  assert.equal(disabled[0], 8, "colours.js, State");
+  assert.ok(Number.isFinite(disabled[1]), "its arm is drawn");
+  await textOf(tab, "#legend", /1disabled/);
+  await tab.screenshot({path: `${given.out}/replay-disabled.png`});
+  await tab.click("#player-close");
   assert.deepEqual(tab.faults, []);
   await tab.context().close();
 }
@@ -190,7 +216,7 @@ export async function tabs(browser) {
   const second = await open("viewer");
   const third = await open("viewer");
   assert.deepEqual([second.streams, third.streams], [0, 0]);
-  await textOf(third, "#fleet-summary", `${given.count} ready`);
+  await untilAllStand(third);
   const same = (tab) => tab.evaluate(() => [...window.focalfleetPage.fleet.theta]);
   assert.deepEqual(await same(second), await same(first), "it has the same fleet");
   assert.equal(await streams(), 200, "of two places one is free");

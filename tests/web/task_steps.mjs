@@ -5,7 +5,8 @@
 // The page's own time is added as measured here.
 
 import {readFileSync} from "node:fs";
-import {assert, dropFile, given, isLive, openTab, signIn, textOf, untilTheyMove, world} from
+import {assert, dropFile, given, isLive, openTab, signIn, textOf, untilAllStand, untilTheyMove,
+  world} from
   "./browser.mjs";
 
 const targets = () => readFileSync(given.targets, "utf8");
@@ -113,7 +114,7 @@ export async function tasks(browser) {
   await tab.reload();
   await signIn(tab, "operator");
   await isLive(tab);
-  await textOf(tab, "#fleet-summary", /ready/);
+  await untilAllStand(tab);
   const hand = new Hand(tab);
 
   await task(hand, "Can this file be served, and how long does it take?", async () => {
@@ -148,7 +149,7 @@ export async function tasks(browser) {
     await hand.answer("#stop-state", "the daemon has it");
   });
   await textOf(tab, "#configuration", /tuesday-2.csv .*is stopped/);
-  await textOf(tab, "#fleet-summary", `${given.count} ready`);
+  await untilAllStand(tab);
   await task(hand, "Find who stopped", async () => {
     await hand.click("#commands summary");
     await hand.answer("#commands-list", /stop by token operator-page/);
@@ -165,8 +166,8 @@ export async function tasks(browser) {
   await task(hand, "An alarm: what is to be done, and mute it until dawn", async () => {
     await hand.click(alarm.locator("summary"));
     await hand.wait(() => alarm.locator(".runbook li").first().waitFor());
-    await hand.choose(alarm.getByLabel("How long it is muted"), "until");
-    await hand.type(alarm.getByLabel("Muted until, UTC"), "05:30");
+    await hand.choose(alarm.getByLabel("How long it is muted"), "dawn");
+    await hand.type(alarm.getByLabel("Muted until, UTC"), "0530");  // once: the browser keeps it
     await hand.type(alarm.getByLabel("Reason to mute"), "waits for the day crew");
     await hand.click(alarm.getByRole("button", {name: "Mute"}));
     await hand.answer("#mutes", /is muted until .* 05:30:\d\d UTC by .*: waits for the day crew/);

@@ -1,35 +1,39 @@
-// Alarms that are open: worst first, equal ones folded, with the runbook's words. They stay until
-// somebody has seen them.
+// Alarms that are open: worst first, equal ones folded. They stay until somebody has seen them. While
+// somebody points at the list or types in it, entries keep their places: new ones come below, and
+// those that are over stay until the pointer has left.
 
+import {AlarmEntry} from "/page/alarm_entry.js";
 import {clock, counted, find, make, setText} from "/page/dom.js";
-import {runbookOf} from "/page/runbook.js";
 
 const kPeriod_ms = 10_000;  // others acknowledge, too
+const kHold_ms = 10_000;    // after the last move of the pointer
 const kRanks = {error: 0, warning: 1, info: 2};
-const kUnitsNamed = 8;
+const kUnitsOfMute = 6;
 
-/** Seconds until it is that time of day in UTC: today, or tomorrow. Units: s. */
-export function secondsUntil(time, now_ms) {
-  const [hours, minutes] = time.split(":").map(Number);
-  const at = new Date(now_ms);
-  at.setUTCHours(hours, minutes, 0, 0);
-  const rest_s = Math.ceil((at.getTime() - now_ms) / 1000);  // not a second too early
-  return rest_s > 0 ? rest_s : rest_s + 24 * 3600;
+/** Whether the alarm began while its kind was muted already. */
+function isSince(alarm, mutes) {
+  const mute = alarm.muted && alarm.state === "open" && mutes.find(({name}) => name === alarm.name);
+  return Boolean(mute) && alarm.first > mute.since;
 }
 
 /** Alarms of one name and state, as one entry. */
-function fold(alarms) {
+function fold({alarms, mutes}) {
   const entries = new Map();
   for (const alarm of alarms) {
-    const key = `${alarm.name} ${alarm.state} ${alarm.muted}`;
-    if (!entries.has(key)) entries.set(key, {...alarm, ids: [], units: [], total: 0});
+    const since = isSince(alarm, mutes);
+    const key = `${alarm.name} ${alarm.state} ${alarm.muted} ${since}`;
+    if (!entries.has(key))
+      entries.set(key, {...alarm, key, since, ids: [], units: [], newest: null, total: 0});
     const entry = entries.get(key);
     entry.ids.push(alarm.id);
     entry.total += alarm.count;
     if (alarm.unit_id !== null) entry.units.push(alarm.unit_id);
-    if (alarm.last >= entry.last) Object.assign(entry, {last: alarm.last, text: alarm.text});
+    if (alarm.last >= entry.last)
+      Object.assign(entry, {last: alarm.last, text: alarm.text, newest: alarm.unit_id});
   }
-  return [...entries.values()].sort((a, b) => a.muted - b.muted ||
+  for (const {units} of entries.values()) units.sort((a, b) => a - b);
+  const rank = ({muted, since}) => muted && !since;
+  return [...entries.values()].sort((a, b) => rank(a) - rank(b) ||
       kRanks[a.severity] - kRanks[b.severity] || (a.last < b.last ? 1 : -1));
 }
 
@@ -71,12 +75,23 @@ export class Alarms {
     this.api = api;
     this.access = access;
     this.onUnit = onUnit;
-    this.open = new Set();  // entries that are unfolded
-    this.drafts = new Map();
+    this.entries = new Map();  // AlarmEntry by key, as the list has them
+    this.answer = null;
     this.shownText = "";
+    this.role = "";
     this.busy = false;
     this.version = -1;
+    this.isHeld = false;
+    this.holdTimer = 0;
     this.sound = new Sound();
+    const list = find("alarms");
+    for (const event of ["pointermove", "pointerdown", "keydown"])
+      list.addEventListener(event, () => this.hold());
+    list.addEventListener("pointerleave", () => this.release());
+    list.addEventListener("focusout", () => setTimeout(() => {
+      if (!list.matches(":hover")) this.release();
+    }));
+    list.addEventListener("toggle", () => this.fitHeight(), true);
     setInterval(() => {
       if (!document.hidden) this.refresh();
     }, kPeriod_ms);
@@ -102,116 +117,94 @@ export class Alarms {
   }
 
   show(answer) {
-    const muted = answer.muted > 0 ? `, ${answer.muted} muted` : "";
+    const since = answer.mutes.reduce((sum, {open_since}) => sum + open_since, 0);
+    const muted = answer.muted === 0 ? "" : `, ${answer.muted} muted` +
+        (since > 0 ? ` (${since} since)` : "");
     setText(find("alarms-summary"),
         answer.open === 0 && !muted ? "None is open." : `${answer.open} open${muted}.`);
-    this.sound.note(answer.alarms.filter(({state, muted}) => state === "open" && !muted)
+    find("alarms-summary").classList.toggle("since", since > 0);
+    this.sound.note(answer.alarms.filter(({state, muted: isMuted}) => state === "open" && !isMuted)
       .map(({id}) => id));
     document.title = answer.open > 0 ? `(${answer.open}) focalfleet` : "focalfleet";
     const text = JSON.stringify([answer, this.access.role]);
-    if (text === this.shownText) return;  // nothing of the list is rebuilt under the pointer
+    if (text === this.shownText) return;  // nothing of the list is touched under the pointer
     this.shownText = text;
-    find("alarms").replaceChildren(...fold(answer.alarms).map((entry) => this.entryOf(entry)));
-    find("mutes").replaceChildren(...answer.mutes.map((mute) => this.muteOf(mute)));
+    this.answer = answer;
+    this.render();
   }
 
-  entryOf(entry) {
-    const key = entry.name;
-    const body = make("div");
-    const open = async () => {
-      if (body.childElementCount > 0) return;
-      body.append(...await runbookOf(key), this.unitsOf(entry), this.actionsOf(entry));
-    };
-    const details = make("details", {ontoggle: () => {
-      if (details.open) this.open.add(key);
-      else this.open.delete(key);
-      if (details.open) open();
-    }},
-    make("summary", {}, make("span", {class: "severity"}, entry.severity), ` ${entry.name}`,
-        entry.muted ? " (muted)" : "", entry.state === "over" ? " (over, not seen yet)" : "",
-        entry.total > 1 ? ` ×${entry.total}` : "",
-        make("br"), entry.text, make("br"),
-        make("span", {class: "hint"}, `${clock(entry.last)} UTC`)),
-    body);
-    details.open = this.open.has(key);
-    const item = make("li", {class: `alarm ${entry.severity}${entry.muted ? " quiet" : ""}`},
-        details);
-    item.append(make("div", {class: "buttons"}, this.access.guard(
-        make("button", {type: "button", onclick: () => this.acknowledge(entry)}, "Acknowledge"),
-        "alarms_ack")));
-    return item;
+  // ---- the list, whose entries keep their places meanwhile
+
+  hold() {
+    this.isHeld = true;
+    clearTimeout(this.holdTimer);
+    this.holdTimer = setTimeout(() => this.release(), kHold_ms);
   }
 
-  unitsOf(entry) {
-    if (entry.units.length === 0) return "";
-    const rest = entry.units.length - kUnitsNamed;
-    return make("p", {}, "Units: ", ...entry.units.slice(0, kUnitsNamed).flatMap((unit) => [
-      make("button", {type: "button", class: "row-button", onclick: () => this.onUnit(unit)},
-          String(unit)), " "]), rest > 0 ? `and ${rest} more` : "");
+  release() {
+    if (find("alarms").querySelector("input:focus, select:focus")) return;  // until focus goes
+    clearTimeout(this.holdTimer);
+    if (!this.isHeld) return;
+    this.isHeld = false;
+    if (this.answer) this.render();
   }
 
-  actionsOf(entry) {
-    // The list is made anew when an alarm comes: what is half typed must not be gone then.
-    const draft = this.drafts.get(entry.name) ?? {reason: "", period: "3600", until: ""};
-    this.drafts.set(entry.name, draft);
-    const reason = make("input", {size: 16, "aria-label": "Reason to mute",
-      placeholder: "reason", value: draft.reason});
-    reason.addEventListener("input", () => {
-      draft.reason = reason.value;
-      setText(trouble, "");
-    });
-    reason.addEventListener("keydown", (event) => {
-      if (event.key === "Enter") mute.click();
-    });
-    const period = make("select", {"aria-label": "How long it is muted"},
-        ...[["1 h", "3600"], ["4 h", "14400"], ["12 h", "43200"], ["until, UTC", "until"]]
-          .map(([text, seconds]) => make("option", {value: seconds}, text)));
-    period.value = draft.period;
-    const until = make("input", {type: "time", "aria-label": "Muted until, UTC",
-      hidden: period.value !== "until", value: draft.until});
-    until.addEventListener("input", () => { draft.until = until.value; });
-    period.addEventListener("change", () => {
-      draft.period = period.value;
-      until.hidden = period.value !== "until";
-      if (!until.hidden) until.focus();
-    });
-    const trouble = make("span", {class: "trouble", role: "status"});
-    const mute = make("button", {type: "button", onclick: async () => {
-      if (reason.value.trim() === "") {
-        setText(trouble, "Give a reason: others will wonder.");
-        return reason.focus();
-      }
-      if (period.value === "until" && until.value === "") {
-        setText(trouble, "Until when?");
-        return until.focus();
-      }
-      const for_s = period.value === "until" ? secondsUntil(until.value, Date.now())
-        : Number(period.value);
-      await this.change(trouble, "alarms_mute", {name: entry.name, for_s,
-        reason: reason.value.trim()});
-    }}, `Mute all ${entry.name}`);
-    return make("div", {class: "buttons"}, period, until, reason, this.access.guard(mute, "alarms_mute"),
-        trouble);
+  render() {
+    const list = find("alarms");
+    const folded = fold(this.answer);
+    const keys = new Set(folded.map(({key}) => key));
+    if (this.role !== this.access.role) this.entries.clear();  // other buttons
+    this.role = this.access.role;
+    const before = this.entries;
+    const kept = this.isHeld ? [...before.values()] : [];
+    this.entries = new Map(kept.map((entry) => [entry.key, entry]));
+    for (const entry of kept) if (!keys.has(entry.key)) entry.end();
+    for (const entry of folded) {
+      const shown = before.get(entry.key) ?? new AlarmEntry(this, entry);
+      shown.update(entry);
+      this.entries.set(entry.key, shown);
+    }
+    let at = list.firstElementChild;  // an element that stays in its place keeps the focus
+    for (const {item} of this.entries.values()) {
+      if (item === at) at = at.nextElementSibling;
+      else list.insertBefore(item, at);
+    }
+    while (at) {
+      const gone = at;
+      at = at.nextElementSibling;
+      gone.remove();
+    }
+    find("mutes").replaceChildren(...this.answer.mutes.map((mute) => this.muteOf(mute)));
+  }
+
+  /** An entry that somebody unfolds gets more room. An alarm never does. */
+  fitHeight() {
+    find("alarms-box").classList.toggle("tall", Boolean(find("alarms").querySelector("details[open]")));
   }
 
   muteOf(mute) {
     const trouble = make("span", {class: "trouble", role: "status"});
+    const units = this.answer.alarms.filter((alarm) => alarm.name === mute.name &&
+        isSince(alarm, [mute]) && alarm.unit_id !== null).map(({unit_id}) => unit_id).sort((a, b) => a - b);
+    const named = units.slice(0, kUnitsOfMute).join(", ") +
+        (units.length > kUnitsOfMute ? ` and ${units.length - kUnitsOfMute} more` : "");
+    const since = mute.open_since === 0 ? [] : [make("b", {}, `${mute.open_since} since` +
+        (units.length === 0 ? "" : `: ${units.length === 1 ? "unit" : "units"} ${named}`)), " "];
     return make("li", {class: "hint"}, `${mute.name} is muted until ${clock(mute.until)} UTC by ` +
-        `${mute.by}: ${mute.reason} (${counted(mute.open, "alarm")}) `,
+        `${mute.by}: ${mute.reason} (${counted(mute.open, "alarm")}). `, ...since,
     this.access.guard(make("button", {type: "button", onclick: () =>
       this.change(trouble, "alarms_unmute", {name: mute.name})}, "Unmute"), "alarms_unmute"),
     trouble);
   }
 
-  acknowledge(entry) {
-    return this.change(find("alarms-summary"), "alarms_ack", {ids: entry.ids});
-  }
-
+  /** A change by the operator, who then sees the list as it is. */
   async change(trouble, verb, args) {
     try {
       await this.api.ask(verb, args);
       this.busy = false;
+      this.isHeld = false;
       await this.refresh();
+      this.fitHeight();
     } catch (error) {
       setText(trouble, error.message);
     }

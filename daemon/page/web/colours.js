@@ -8,14 +8,14 @@ const P = Object.fromEntries(kPhases.map((name, code) => [name, code]));
 
 /** The states of a unit as the legend has them. Later ones are drawn on top. */
 export const kStates = [
-  {name: "ready", text: "stands"},
-  {name: "arrived", text: "at its target"},
-  {name: "preparing", text: "is being made ready"},
-  {name: "moving", text: "moves"},
-  {name: "unserved", text: "target not served"},
+  {name: "ready", text: "standing"},
+  {name: "arrived", text: "at target"},
+  {name: "preparing", text: "being made ready"},
+  {name: "moving", text: "moving"},
+  {name: "unserved", text: "stopped or not served"},
   {name: "lost", text: "place not known"},
   {name: "silent", text: "not heard"},
-  {name: "fault", text: "fault"},
+  {name: "fault", text: "in fault"},
   {name: "disabled", text: "disabled: an obstacle"},
 ];
 export const State = Object.fromEntries(kStates.map((state, index) => [state.name, index]));

@@ -13,7 +13,8 @@ const kWorstShown = 8;
 function byReason(rows) {
   const counts = new Map();
   for (const {reason, outcome} of rows) {
-    const text = (reason || outcome).replace(/ by unit \d+$/, " by another unit");
+    const text = (reason || outcome).replace(/ by unit \d+$/, " by another unit")
+      .replace(/`focalfleet (\w+) \d+`/, "`focalfleet $1 UNIT`");
     counts.set(text, (counts.get(text) ?? 0) + 1);
   }
   return [...counts].sort((a, b) => b[1] - a[1]);
@@ -37,6 +38,7 @@ export class Configuration {
     Object.assign(this, {api, access, plate, player, onUnit, onErrors});
     this.facts = null;
     this.file = null;
+    this.preview = null;
     this.isShown = false;  // its plan is on the plate
     this.resultOf = "";  // the configuration whose result is shown
     find("choose-file").addEventListener("click", () => find("file").click());
@@ -72,8 +74,9 @@ export class Configuration {
 
   clear() {
     this.file = null;
+    this.preview = null;
     this.plate.marked = [];
-    this.plate.dirty = true;
+    this.plate.showTargets(null);
     if (this.isShown) this.player.close();
     this.say();
   }
@@ -112,6 +115,7 @@ export class Configuration {
   }
 
   show(preview) {
+    this.preview = preview;
     const {fleet} = this.plate;
     this.plate.marked = preview.unserved.map(({unit_id}) => fleet.placeOf.get(unit_id))
       .filter((u) => u !== undefined);
@@ -125,21 +129,32 @@ export class Configuration {
     `Move ${counted(preview.moving, "unit")}`), "apply");
     const power = make("dd", {}, `at most ${preview.peak_power_W.toFixed(0)} W`);
     if (preview.moving > 0) this.addPower(power, preview);
-    this.say(make("h3", {}, `Preview of ${this.file.source}`), make("dl", {},
-        make("dt", {}, "served"), make("dd", {}, `${preview.served.toLocaleString("en")} of ` +
-            counted(preview.targeted, "target")),
-        make("dt", {}, "takes"), make("dd", {}, duration(preview.makespan_s)),
-        make("dt", {}, "power"), power),
-    ...(not === 0 ? [] : [make("p", {}, `${counted(not, "target")} not served, marked on the plate:`),
-      make("ul", {}, ...byReason(preview.unserved).map(([reason, count]) =>
-        make("li", {}, `${count}: ${reason}`))),
-      make("p", {}, ...preview.unserved.slice(0, kUnservedShown).flatMap(({unit_id}) =>
-        [this.unitButton(unit_id), " "]), not > kUnservedShown ? "…" : "")]),
-    ...(preview.moving === 0 ? [] : [make("p", {class: "buttons"}, make("button", {type: "button",
-      id: "play-preview", onclick: () => this.playPreview(preview)}, "Play the plan"))]),
-    make("p", {class: "buttons"}, apply, corrections,
-        make("button", {type: "button", onclick: () => this.clear()}, "Discard")),
-    make("p", {class: "trouble", id: "apply-trouble", role: "alert"}));
+    const play = preview.moving === 0 ? "" : make("button", {type: "button", id: "play-preview",
+      onclick: () => this.playPreview(preview)}, "Play the plan");
+    if (preview.moving > 0) this.addTargets(preview);
+    // The buttons come first: what is known later does not move them.
+    this.say(make("h3", {}, `Preview of ${this.file.source}`),
+        make("p", {class: "buttons"}, apply, play,
+            make("button", {type: "button", onclick: () => this.clear()}, "Discard")),
+        make("p", {class: "buttons"}, make("span", {class: "hint"}, "Corrections"), corrections),
+        make("p", {class: "trouble", id: "apply-trouble", role: "alert"}), make("dl", {},
+            make("dt", {}, "served"), make("dd", {}, `${preview.served.toLocaleString("en")} of ` +
+                counted(preview.targeted, "target")),
+            make("dt", {}, "takes"), make("dd", {}, duration(preview.makespan_s)),
+            make("dt", {}, "power"), power),
+        ...(not === 0 ? [] : [make("p", {}, `${counted(not, "target")} not served, marked on the plate:`),
+          ...this.reasonsAndUnits(preview.unserved)]));
+  }
+
+  /** Reasons with their counts, and units as buttons; the rest is counted. */
+  reasonsAndUnits(rows) {
+    const reasons = byReason(rows);
+    const more = (count, noun) => count > 0 ? ` and ${counted(count, `more ${noun}`)}` : "";
+    return [make("ul", {}, ...reasons.slice(0, kUnservedShown).map(([reason, count]) =>
+      make("li", {}, `${count}: ${reason}`)), ...(reasons.length > kUnservedShown
+      ? [make("li", {}, more(reasons.length - kUnservedShown, "reason").trim())] : [])),
+    make("p", {}, ...rows.slice(0, kUnservedShown).flatMap(({unit_id}) =>
+      [this.unitButton(unit_id), " "]), more(rows.length - kUnservedShown, "unit").trim())];
   }
 
   async addPower(element, preview) {
@@ -151,17 +166,34 @@ export class Configuration {
     }
   }
 
-  /** The plan in motion, from the places where the units stood when it was made. */
+  /** The motion of the preview's plan. */
+  async motionOf(preview) {
+    const bytes = await this.api.bytes(`/preview-motion?plan=${preview.plan}`);
+    if (!bytes) throw new Error("another preview came since; preview the file again");
+    return motionsIn(bytes)[0];
+  }
+
+  /** The plate shows where the fibres are to go. */
+  async addTargets(preview) {
+    try {
+      const {units} = preview.motion = await this.motionOf(preview);
+      if (preview !== this.preview) return;
+      this.plate.showTargets(new Map([...units].map(([u, {end}]) => [u, end])));
+    } catch {
+      // Another preview came since: the plate shows its targets.
+    }
+  }
+
+  /** The plan in motion, from the places where the units stand. */
   async playPreview(preview) {
     const {plate, player} = this;
     try {
-      const bytes = await this.api.bytes(`/preview-motion?plan=${preview.plan}`);
-      if (!bytes) throw new Error("another preview came since; preview the file again");
+      const motion = preview.motion ?? await this.motionOf(preview);
       const unserved = new Set(preview.unserved.map(({unit_id}) => plate.fleet.placeOf.get(unit_id)));
-      const film = filmOfPreview(plate.fleet, motionsIn(bytes)[0], unserved,
+      const film = filmOfPreview(plate.fleet, motion, unserved,
           (u) => stateOf(plate.fleet, u));
       this.isShown = true;
-      player.open(film, {title: `Preview of ${this.file.source}, not live: nothing moves.`,
+      player.open(film, {name: "preview", title: `Preview of ${this.file.source}, not live: nothing moves.`,
         note: "By the rows of its plan.",
         describe: (u) => `Unit ${plate.fleet.id[u]}: ` + (unserved.has(u) ? "not served."
           : Number.isNaN(film.targetTheta[u]) ? "it stays." : "it moves."),
@@ -280,9 +312,9 @@ export class Configuration {
     }
     const {unserved} = status.configuration;
     if (status.configuration.id !== id || unserved.length === 0) return;
-    element.append(make("h3", {}, "Not served"), make("ul", {}, ...byReason(unserved)
-      .slice(0, kUnservedShown).map(([reason, count]) => make("li", {}, `${count}: ${reason}`))),
-    make("p", {}, ...unserved.slice(0, kUnservedShown).flatMap(({unit_id}) =>
-      [this.unitButton(unit_id), " "])));
+    const stopped = unserved.filter(({outcome}) => outcome === "stopped");
+    const others = unserved.filter(({outcome}) => outcome !== "stopped");
+    for (const [title, rows] of [["Stopped", stopped], ["Not served", others]])
+      if (rows.length > 0) element.append(make("h3", {}, title), ...this.reasonsAndUnits(rows));
   }
 }

@@ -49,3 +49,8 @@ export function micrometres(um) {
 export function clock(iso) {
   return iso ? `${iso.slice(0, 10)} ${iso.slice(11, 19)}` : "–";
 }
+
+/** The same without the year, where there is little room. */
+export function dayAndClock(iso) {
+  return clock(iso).slice(5);
+}

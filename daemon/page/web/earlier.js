@@ -1,11 +1,12 @@
 // Configurations that are over, newest first, page by page, and the replay of each.
 
 import {State} from "/page/colours.js";
-import {clock, counted, duration, find, make, micrometres, setText} from "/page/dom.js";
+import {clock, counted, duration, find, make, micrometres} from "/page/dom.js";
 import {addRows, Film} from "/page/film.js";
 import {motionsIn} from "/page/motion.js";
 
 const kRowsOfPage = 10;
+const kAlarmsShown = 8;
 const kPagesMax = 64;  // of moves: 64 x 4096
 const kNear_rad = 0.02 * Math.PI / 180;
 const kRadians = Math.PI / 180;
@@ -42,6 +43,10 @@ function plannedOf(move, motions) {
 export function filmOfReplay(fleet, moves, motions, errors) {
   const film = new Film(fleet.count);
   film.state.fill(State.ready);
+  // A disabled unit does not move: it most likely stood where it stands now. Units that took part are
+  // drawn over this.
+  for (let u = 0; u < fleet.count; ++u)
+    if (!fleet.enabled[u]) film.stand(u, fleet.theta[u], fleet.phi[u], State.disabled);
   // The start signal came before the first unit was heard at its planned end.
   const starts = motions.map(() => Infinity);
   for (const move of moves) {
@@ -50,9 +55,14 @@ export function filmOfReplay(fleet, moves, motions, errors) {
       starts[move.plan.index] = Math.min(starts[move.plan.index],
           move.ended_s - move.plan.planned.end_s);
   }
-  const counts = {byPlan: 0, even: 0, still: 0, open: 0, ends: new Map()};
+  const counts = {byPlan: 0, even: 0, still: 0, open: 0, ends: new Map(),
+    disabled: fleet.count - fleet.enabled.reduce((sum, is) => sum + is, 0)};
   for (const move of moves) {
     const {u, end, from, to} = move;
+    if (film.restState[u] === State.disabled) {  // it took part, and was disabled later
+      film.stand(u, NaN, NaN, State.ready);
+      --counts.disabled;
+    }
     counts.ends.set(end, (counts.ends.get(end) ?? 0) + 1);
     [film.targetTheta[u], film.targetPhi[u]] = to;
     const start_s = move.plan ? starts[move.plan.index] : Infinity;
@@ -78,9 +88,10 @@ export function filmOfReplay(fleet, moves, motions, errors) {
 }
 
 /** Which of the two is shown. */
-export function noteOf({byPlan, even, still, open}) {
+export function noteOf({byPlan, even, still, open, disabled}) {
   const rest = (still > 0 ? ` ${counted(still, "unit")} did not move.` : "") + (open > 0
-    ? ` The end of ${counted(open, "move")} is not known, or not yet: shown where it began.` : "");
+    ? ` The end of ${counted(open, "move")} is not known, or not yet: shown where it began.` : "") +
+      (disabled > 0 ? ` ${counted(disabled, "unit")} took no part, disabled now: shown as now.` : "");
   if (byPlan === 0 && even === 0) return `${open > 0 ? "" : "Nothing moved."}${rest}`.trim();
   if (byPlan === 0) return "Even motion between the recorded beginning and end of each move: " +
       `the rows of the plan are not kept.${rest}`;
@@ -146,7 +157,7 @@ export class Earlier {
       say("");
       const {film, counts} = filmOfReplay(this.plate.fleet, moves, motions, first.errors);
       const lastOf = new Map(moves.map((move) => [move.u, move]));
-      this.player.open(film, {title: `Replay of configuration ${id}, not live.`,
+      this.player.open(film, {name: "replay", title: `Replay of configuration ${id}, not live.`,
         note: noteOf(counts) + (isCut ? " It is too long to be shown whole." : ""),
         describe: (u) => this.describe(film, lastOf.get(u), u),
         closed: () => find("replay-trouble").replaceChildren()});
@@ -176,7 +187,8 @@ export class Earlier {
 
   describe(film, move, u) {
     const name = `Unit ${this.plate.fleet.id[u]}: `;
-    if (!move) return `${name}it took no part.`;
+    if (!move) return `${name}it took no part.` + (film.restState[u] === State.disabled
+      ? " It is disabled now, and shown where it stands now." : "");
     const at = move.ended_s === null ? "" : ` ${duration(move.ended_s)} after it was applied`;
     const off = Number.isNaN(film.error_um[u]) ? ""
       : `; measured ${micrometres(film.error_um[u])} from its target`;
@@ -187,8 +199,9 @@ export class Earlier {
     const ends = [...counts.ends].sort((a, b) => b[1] - a[1])
       .map(([end, count]) => `${count.toLocaleString("en")} ${end.replace("_", " ")}`).join(", ");
     find("replay-trouble").replaceChildren(make("p", {}, `Moves: ${ends || "none"}.`),
-        make("ul", {}, ...first.alarms.slice(0, 8).map(({text, at}) =>
-          make("li", {class: "event warning"}, `${clock(at)} ${text}`))));
-    setText(find("player-unit"), "");
+        make("ul", {}, ...first.alarms.slice(0, kAlarmsShown).map(({text, at}) =>
+          make("li", {class: "event warning"}, `${clock(at)} UTC ${text}`))),
+        first.alarms.length > kAlarmsShown
+          ? make("p", {}, `and ${counted(first.alarms.length - kAlarmsShown, "alarm")} more`) : "");
   }
 }

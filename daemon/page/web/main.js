@@ -4,14 +4,14 @@ import {Access} from "/page/access.js";
 import {Alarms} from "/page/alarms.js";
 import {Api} from "/page/api.js";
 import {Camera} from "/page/camera.js";
-import {makeFilmThemes, makeThemes} from "/page/colours.js";
+import {kStates, makeFilmThemes, makeThemes, stateOf} from "/page/colours.js";
 import {Configuration} from "/page/configuration.js";
 import {Curves} from "/page/curves.js";
 import {counted, duration, find, make, set, setText} from "/page/dom.js";
 import {Diagnosis} from "/page/diagnosis.js";
 import {Earlier} from "/page/earlier.js";
 import {Commands, Events} from "/page/events.js";
-import {Fleet, kPhases} from "/page/frames.js";
+import {Fleet} from "/page/frames.js";
 import {Model} from "/page/model.js";
 import {Nights} from "/page/nights.js";
 import {Plate} from "/page/plate.js";
@@ -87,10 +87,10 @@ class Page {
     this.plate = new Plate(find("plate"), this.fleet);
     this.plate.ways = new Ways(this.api, this.plate);
     const showUnit = (id) => this.unit.showId(id);
-    this.unit = new UnitPanel(this.api, this.plate, () => this.showScale(),
-        (u) => this.player?.select(u));
-    this.alarms = new Alarms(this.api, this.access, showUnit);
     this.player = new Player(this.plate, () => this.filmChanged(), () => this.showLegend());
+    this.unit = new UnitPanel(this.api, this.plate, this.player, () => this.showScale(),
+        (u) => this.player.select(u));
+    this.alarms = new Alarms(this.api, this.access, showUnit);
     this.configuration = new Configuration(this.api, this.access, this.plate, this.player,
         {onUnit: showUnit, onErrors: () => this.showErrors()});
     this.earlier = new Earlier(this.api, this.access, this.plate, this.player);
@@ -119,7 +119,7 @@ class Page {
       this.unit.showId(id);
     };
     this.curves = new Curves(api, plate, () => this.sheets.shown === "curves");
-    this.nights = new Nights(api);
+    this.nights = new Nights(api, () => this.sheets.shown === "nights");
     this.model = new Model(api, this.access);
     this.diagnosis = new Diagnosis(api, this.access, () => this.sheets.shown === "diagnosis",
         () => this.sheets.show("model"));
@@ -140,6 +140,8 @@ class Page {
     find("sheet-plate").classList.toggle("film", Boolean(film));
     this.plate.setTheme(themes[select.value]);
     this.player.select(this.plate.selected);
+    this.unit.showFilm();
+    find("legend-of").hidden = !film;
     this.showLegend();
   }
 
@@ -191,6 +193,7 @@ class Page {
   renewLegend(now_ms) {
     this.isLegendOld = false;
     this.legendAt_ms = now_ms + kLegend_ms;
+    this.showSummary();
     this.showLegend();
   }
 
@@ -239,14 +242,11 @@ class Page {
   showFacts() {
     const {facts} = this.fleet;
     this.stop.note(facts.configuration);
-    const counts = facts.phases.map((count, p) => [kPhases[p], count])
-      .filter(([, count]) => count > 0).sort((a, b) => b[1] - a[1]);
-    setText(find("fleet-summary"), `${counted(facts.units, "unit")}: ` +
-        counts.map(([name, count]) => `${count.toLocaleString("en")} ${name}`).join(", ") +
-        (facts.store_failing ? ". The store fails: nothing new may move." : ""));
+    this.showSummary();
     this.configuration.note(facts);
     this.plate.ways.note(facts);
     this.earlier.note(facts);
+    this.nights.note(facts);
     this.alarms.note(facts.alarms);
     this.events.note(facts);
     this.unit.history.note(facts);
@@ -256,6 +256,20 @@ class Page {
     setText(find("buses"), `${counted(facts.buses.length, "bus", "buses")}, ` + (down.length === 0
       ? `all up, the fullest ${(100 * load).toFixed(0)} % full`
       : `${down.length} not up: ${down.slice(0, 12).map(({bus_id}) => bus_id).join(", ")}`) + ".");
+  }
+
+  /** The live fleet by states, in the legend's words. */
+  showSummary() {
+    const {fleet, fleet: {facts}} = this;
+    if (!facts) return;
+    const counts = new Array(kStates.length).fill(0);
+    for (let u = 0; u < fleet.count; ++u) ++counts[stateOf(fleet, u)];
+    const text = `${counted(facts.units, "unit")}: ` + kStates.map(({text: name}, k) => [name, counts[k]])
+      .filter(([, count]) => count > 0).sort((a, b) => b[1] - a[1])
+      .map(([name, count]) => `${count.toLocaleString("en")} ${name.split(":")[0]}`).join(", ");
+    setText(find("fleet-summary"), (facts.store_failing
+      ? "The store fails: nothing new may move. " : "") + text);
+    set(find("fleet-summary"), "title", text);  // it may be cut short
   }
 
   showLegend() {

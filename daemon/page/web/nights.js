@@ -20,14 +20,25 @@ function summaryOf(rows) {
   const sum = (name) => rows.reduce((total, row) => total + row[name], 0);
   return {configurations: rows.length, targeted: sum("targeted"), arrived: sum("arrived"),
     lost: sum("refused") + sum("failed") + sum("unmeasured"),
+    unitsStopped: sum("stopped"),
     stopped: rows.filter(({state}) => state === "stopped").length,
     makespan_s: median(rows.map(({makespan_s}) => makespan_s ?? 0)),
     behind_s: median(rows.map((row) => (row.makespan_s ?? 0) - (row.makespan_predicted_s ?? 0)))};
 }
 
 export class Nights {
-  constructor(api) {
-    this.api = api;
+  /** `isShown()`: whether somebody looks at the table. */
+  constructor(api, isShown) {
+    Object.assign(this, {api, isShown});
+    this.key = "";
+  }
+
+  /** The newest state of the fleet: a configuration may have begun, or ended. */
+  note({configuration: c, busy}) {
+    const key = `${c.id} ${c.state} ${busy}`;
+    if (key === this.key) return;
+    this.key = key;
+    if (this.isShown()) this.show();
   }
 
   async show() {
@@ -50,8 +61,8 @@ export class Nights {
 
   tableOf(nights) {
     if (nights.length === 0) return make("p", {class: "hint"}, "There was no configuration yet.");
-    const heads = ["night of", "configurations", "stopped", "targets", "arrived", "not served",
-      "makespan, median", "behind plan"];
+    const heads = ["night of", "configurations", "of them stopped", "targets", "arrived", "stopped",
+      "not served", "makespan, median", "behind plan"];
     const share = ({arrived, targeted}) => targeted === 0 ? "–"
       : `${(Math.floor(1000 * arrived / targeted) / 10).toFixed(1)} %`;
     return make("table", {class: "wide"}, make("caption", {}, "Nights, newest first"),
@@ -59,8 +70,8 @@ export class Nights {
         make("tbody", {}, ...nights.map(([night, rows]) => {
           const s = summaryOf(rows);
           return make("tr", {}, make("th", {scope: "row"}, night), ...[s.configurations, s.stopped,
-            s.targeted.toLocaleString("en"), share(s), s.lost, duration(s.makespan_s),
-            duration(s.behind_s)].map((value) => make("td", {}, String(value))));
+            s.targeted.toLocaleString("en"), share(s), s.unitsStopped, s.lost,
+            duration(s.makespan_s), duration(s.behind_s)].map((value) => make("td", {}, String(value))));
         })));
   }
 }

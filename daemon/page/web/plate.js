@@ -40,6 +40,7 @@ export class Plate {
     this.turning = new Turning(fleet);
     this.placed = (u, theta, phi) => this.place(u, theta, phi);
     this.selected = -1;
+    this.targets = null;  // [theta, phi] by place, of a preview; null: the fleet's own
     this.marked = [];  // units that a preview does not serve
     this.ways = null;  // of the configuration under way
     this.film = null;  // shown in place of the live fleet
@@ -186,11 +187,17 @@ export class Plate {
     return places.sort((a, b) => error_um[b] - error_um[a]).slice(0, most);
   }
 
+  /** Targets of a preview by place, as [theta, phi], or with null those of the fleet again. */
+  showTargets(targets) {
+    this.targets = targets;
+    this.dirty = true;
+  }
+
   targetOf(u) {
-    const {fleet} = this;
-    const {targetTheta, targetPhi} = this.film ?? fleet;
-    const theta = targetTheta[u];
-    const both = theta + targetPhi[u];
+    const {fleet, film, targets} = this;
+    const [theta, phi] = targets && !film ? targets.get(u) ?? [NaN, NaN]
+      : [(film ?? fleet).targetTheta[u], (film ?? fleet).targetPhi[u]];
+    const both = theta + phi;
     return [
       fleet.x_mm[u] + fleet.arm_theta_mm[u] * Math.cos(theta) +
           fleet.arm_phi_mm[u] * Math.cos(both),
@@ -257,8 +264,9 @@ export class Plate {
     for (const u of this.marked) {
       const x = view.screenX(fleet.x_mm[u]);
       const y = view.screenY(fleet.y_mm[u]);
-      context.moveTo(x + 6, y);
-      context.arc(x, y, Math.max(6, 0.3 * view.pitch_px), 0, kFullCircle);
+      const radius = Math.max(6, 0.3 * view.pitch_px);
+      context.moveTo(x + radius, y);
+      context.arc(x, y, radius, 0, kFullCircle);
     }
     context.stroke();
     const u = this.selected;

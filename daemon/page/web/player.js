@@ -13,6 +13,7 @@ export class Player {
     this.isPlaying = false;
     this.last_ms = 0;
     this.legendAt_ms = 0;
+    this.name = "";
     this.describe = () => "";
     find("player-play").addEventListener("click", () => this.toggle());
     find("player-close").addEventListener("click", () => this.close());
@@ -22,10 +23,13 @@ export class Player {
     });
   }
 
-  /** `describe(u)` says what a unit did; `closed()` is called when the live fleet is back. */
-  open(film, {title, note, describe = () => "", closed = () => {}}) {
+  /**
+   * `name` is that of its kind. `describe(u)` says what a unit did; `closed()` is called when the live
+   * fleet is back.
+   */
+  open(film, {name, title, note, describe = () => "", closed = () => {}}) {
     if (this.film) this.closed();
-    Object.assign(this, {film, describe, closed});
+    Object.assign(this, {film, name, describe, closed});
     setText(find("player-title"), title);
     find("player-note").replaceChildren(note);
     find("player").hidden = false;

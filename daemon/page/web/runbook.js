@@ -15,14 +15,15 @@ async function load() {
   return found;
 }
 
-/** Texts between backquotes are code; links are their words. */
-function proseOf(text) {
+/** Texts between backquotes are code, in which the unit has its number; links are their words. */
+function proseOf(text, unit) {
+  const codeOf = (part) => unit === null ? part : part.replace(/\bUNIT\b/g, String(unit));
   const plain = text.replace(/\[([^\]]*)\]\([^)]*\)/g, "$1").replace(/\s+/g, " ").trim();
-  return plain.split("`").map((part, k) => k % 2 === 1 ? make("code", {}, part) : part);
+  return plain.split("`").map((part, k) => k % 2 === 1 ? make("code", {}, codeOf(part)) : part);
 }
 
-/** What the runbook has about the alarm, as elements. */
-export async function runbookOf(name) {
+/** What the runbook has about the alarm, as elements; commands name the unit, if there is one. */
+export async function runbookOf(name, unit) {
   sections ??= load();
   let text;
   try {
@@ -32,6 +33,6 @@ export async function runbookOf(name) {
   }
   if (!text) return [make("p", {class: "hint"}, "The runbook has no entry for it.")];
   const [prose, ...items] = text.split(/^- /m);
-  return [make("p", {}, ...proseOf(prose)),
-    make("ul", {class: "runbook"}, ...items.map((item) => make("li", {}, ...proseOf(item))))];
+  return [make("p", {}, ...proseOf(prose, unit)),
+    make("ul", {class: "runbook"}, ...items.map((item) => make("li", {}, ...proseOf(item, unit))))];
 }

@@ -10,7 +10,10 @@ export class Sheets {
     this.opened = opened;
     this.shown = "plate";
     for (const name of kNames)
-      find(`show-${name}`).addEventListener("click", () => this.show(name));
+      find(`show-${name}`).addEventListener("click", () => {
+        this.show(name);
+        window.scrollTo(0, 0);  // a small screen has more below
+      });
   }
 
   show(name) {

@@ -1,8 +1,8 @@
 // One unit: where it is, what is known and by whom, who is beside it, and what it did.
 
 import {kStates} from "/page/colours.js";
-import {kOutcomes, kPhases} from "/page/frames.js";
-import {find, make, micrometres, setText} from "/page/dom.js";
+import {kOutcomes, kPhases, kWitnesses} from "/page/frames.js";
+import {counted, find, make, micrometres, setText} from "/page/dom.js";
 import {UnitHistory} from "/page/unit_history.js";
 
 const kRefresh_ms = 2000;
@@ -19,10 +19,14 @@ function point(x, y) {
 }
 
 export class UnitPanel {
-  /** `onView()`: the view moves; `onSelect(place)`: another unit, or -1. */
-  constructor(api, plate, onView, onSelect) {
-    Object.assign(this, {api, plate, onView, onSelect});
+  /**
+   * `onView()`: the view moves; `onSelect(place)`: another unit, or -1. `player` shows a film at times,
+   * which is not what the panel says of the unit.
+   */
+  constructor(api, plate, player, onView, onSelect) {
+    Object.assign(this, {api, plate, player, onView, onSelect});
     this.place = -1;
+    this.film = make("div", {id: "unit-film"});
     this.list = make("dl");
     this.beside = make("p", {id: "beside"});
     this.history = new UnitHistory(api);
@@ -49,8 +53,21 @@ export class UnitPanel {
   /** The unit that stands farthest from its target. */
   showWorst() {
     const [worst] = this.plate.worst(1);
-    if (worst === undefined) setText(find("find-trouble"), "No unit stands off its target.");
+    if (worst === undefined) setText(find("find-trouble"), this.whyNoneIsWorst());
     else this.showId(this.plate.fleet.id[worst]);
+  }
+
+  /** No unit is known to stand off its target: what is known instead. */
+  whyNoneIsWorst() {
+    const {outcome, witness} = this.plate.fleet;
+    const count = (list, is) => list.reduce((sum, value) => sum + (is(value) ? 1 : 0), 0);
+    const targeted = count(outcome, (value) => value !== kOutcomes.indexOf("none"));
+    const arrived = count(outcome, (value) => value === kOutcomes.indexOf("arrived"));
+    const measured = count(witness, (value) => value === kWitnesses.indexOf("measured"));
+    if (targeted === 0) return "No unit has a target.";
+    const who = arrived === targeted ? `All ${counted(arrived, "unit")} arrived`
+      : `${arrived} of ${counted(targeted, "unit")} arrived`;
+    return measured === 0 ? `${who}; errors not measured.` : `${who}; none stands off its target.`;
   }
 
   select(place) {
@@ -60,13 +77,21 @@ export class UnitPanel {
     this.plate.dirty = true;
     find("unit-hint").hidden = place >= 0;
     find("unit").replaceChildren(...(place >= 0
-      ? [this.list, this.beside, ...this.history.elements] : []));
+      ? [this.film, this.list, this.beside, ...this.history.elements] : []));
     if (place < 0) return;
     find("find-id").value = String(this.plate.fleet.id[place]);
     this.list.replaceChildren();
+    this.showFilm();
     this.showBeside();
     this.refresh();
     this.history.show(this.plate.fleet.id[place]);
+  }
+
+  /** What the unit does in the film, where the plate shows one; what stands below is live. */
+  showFilm() {
+    const {film, name} = this.player;
+    this.film.replaceChildren(...(!film || this.place < 0 ? [] : [make("h3", {}, `In the ${name}`),
+      make("p", {}, this.player.describe(this.place)), make("h3", {}, "Live now")]));
   }
 
   /** Units whose arms can touch this one's. */

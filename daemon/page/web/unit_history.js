@@ -2,7 +2,7 @@
 // page; its parameters, and who gave them; its alarms and changes. The latter two are asked for
 // while they are open alone.
 
-import {clock, make, micrometres} from "/page/dom.js";
+import {dayAndClock, make, micrometres} from "/page/dom.js";
 import {eventLine} from "/page/events.js";
 
 const kMovesOfPage = 10;
@@ -92,10 +92,10 @@ export class UnitHistory {
       this.later = null;  // the move after those that come next
       this.moves.replaceChildren(make("h3", {}, "Moves, newest first"), moves.length === 0
         ? hint("It has not moved yet.")
-        : make("table", {}, headOf("began, UTC", "configuration", "end", "off by"), this.rows));
+        : make("table", {}, headOf("began, UTC", "conf.", "end", "off by"), this.rows));
     }
     for (const move of moves) {
-      this.rows.append(make("tr", {}, make("td", {}, clock(move.began)),
+      this.rows.append(make("tr", {}, make("td", {title: move.began}, dayAndClock(move.began)),
           make("td", {}, String(move.configuration)), make("td", {}, move.end.replaceAll("_", " ")),
           make("td", {}, errorAfter(move, this.later, measured))));
       this.later = move;

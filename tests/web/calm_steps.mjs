@@ -1,0 +1,148 @@
+// The page while data arrive: buttons stay where an operator aims at them, alarms name their faults,
+// and nothing that begins in a muted kind goes unseen.
+
+import {readFileSync} from "node:fs";
+import {assert, axeFindings, dropFile, given, isLive, openTab, signIn, textOf, untilAllStand, world}
+  from "./browser.mjs";
+
+const targets = () => readFileSync(given.targets, "utf8");
+const say = (text) => process.stdout.write(`${text}\n`);
+
+const kButtons = ["#stop", "#sound", "#choose-file", "#find-id", "#worst", "#theme", "#show-plate",
+  "#sign-in"];
+
+/** Where elements are on the screen, by their selectors. */
+async function placesOf(tab, selectors) {
+  const places = {};
+  for (const selector of selectors) {
+    const {x, y} = await tab.locator(selector).first().boundingBox();
+    places[selector] = [Math.round(x), Math.round(y)];
+  }
+  return places;
+}
+
+const alarmOf = (tab, text) => tab.locator("#alarms > li", {hasText: text}).first();
+
+async function alarms(tab) {
+  say("an alarm names the fault, and moves no button");
+  const before = await placesOf(tab, kButtons);
+  await world("fault 9");
+  await textOf(tab, "#alarms > li:first-child", /unit 9 (is in fault: |reports fault )over_temperature/);
+  assert.deepEqual(await placesOf(tab, kButtons), before, "an alarm came");
+
+  say("the runbook's commands have the number of the unit");
+  const fault = alarmOf(tab, "UnitFault");
+  await fault.locator("summary").click();
+  await fault.locator(".runbook li").first().waitFor();
+  assert.match(await fault.innerText(), /focalfleet unit 9[\s\S]*focalfleet enable 9/);
+  assert.doesNotMatch(await fault.innerText(), /\bUNIT\b/);
+
+  say("where somebody points, entries and their buttons stay while alarms come");
+  const aimed = ["#alarms .acknowledge", "#alarms button:has-text('Mute all UnitFault')"];
+  await fault.getByLabel("Reason to mute").fill("half a rea");
+  await tab.hover(aimed[1]);
+  const places = await placesOf(tab, aimed);
+  await world("fault 12");
+  await textOf(tab, "#alarms > li:first-child", /unit 12 /);
+  await textOf(tab, "#alarms", /Commands name unit 12, the newest; they go for each of 9, 12\./);
+  await world("silence 15");
+  await alarmOf(tab, "UnitSilent").waitFor();
+  assert.deepEqual(await placesOf(tab, aimed), places, "two more alarms came");
+  assert.equal(await fault.getByLabel("Reason to mute").inputValue(), "half a rea");
+  await tab.screenshot({path: `${given.out}/alarms-held.png`});
+  await tab.locator("#legend-title").click();
+  await textOf(tab, "#alarms > li:first-child", /UnitSilent/);
+  await alarmOf(tab, "UnitFault").locator("summary").click();
+  assert.deepEqual(await axeFindings(tab), []);
+}
+
+async function mutes(tab) {
+  say("muted until dawn: the time is given once, in 24 hours of UTC");
+  const fault = alarmOf(tab, "UnitFault");
+  await fault.locator("summary").click();
+  await fault.getByLabel("How long it is muted").selectOption("dawn");
+  await fault.getByLabel("Reason to mute").fill("waits for the day crew");
+  await fault.getByRole("button", {name: "Mute"}).click();
+  await textOf(tab, "#alarms", "When is dawn, UTC");
+  await fault.getByLabel("Muted until, UTC").fill("17:61");
+  await fault.getByRole("button", {name: "Mute"}).click();
+  await textOf(tab, "#alarms", "When is dawn, UTC");
+  await fault.getByLabel("Muted until, UTC").fill("1730");
+  await fault.getByRole("button", {name: "Mute"}).click();
+  await textOf(tab, "#mutes", /UnitFault is muted until \S+ 17:30:\d\d UTC .*\(2 alarms\)/);
+  const silent = alarmOf(tab, "UnitSilent");
+  await silent.locator("summary").click();
+  await silent.getByLabel("How long it is muted").selectOption("dawn");
+  assert.equal(await silent.getByLabel("Muted until, UTC").inputValue(), "17:30");
+  await silent.locator("summary").click();
+
+  say("what begins in a muted kind is seen");
+  await world("fault 20-29");
+  await textOf(tab, "#alarms-summary", /12 muted \(10 since\)/);
+  await textOf(tab, "#mutes", /10 since: units 20, 21, 22, 23, 24, 25 and 4 more/);
+  await textOf(tab, "#alarms > li:not(.quiet)", /UnitFault \(since it was muted\)/);
+  await tab.screenshot({path: `${given.out}/mutes.png`});
+}
+
+export async function calm(browser) {
+  const tab = await openTab(browser);
+  await signIn(tab, "operator");
+  await isLive(tab);
+  await untilAllStand(tab);
+
+  say("what happened: many units that did the same are one line");
+  await tab.click("#events summary");
+  await textOf(tab, "#events-list", /UTC unit \d+: serial \d+, enabled[\s\S]*and \d{2,} more like it/);
+  assert.ok(await tab.locator("#events-list > *").count() < 20);
+  await tab.click("#events-title");
+  await tab.locator("aside").evaluate((aside) => aside.scrollTo(0, 0));
+
+  say("no unit has a target: Worst says so, and selects none");
+  await tab.click("#worst");
+  await textOf(tab, "#find-trouble", "No unit has a target.");
+
+  say("a preview: its buttons come first, its targets are on the plate before it is played");
+  const before = await placesOf(tab, ["#stop", "#sound", "#choose-file"]);
+  await dropFile(tab, "night-1.csv", targets());
+  await tab.locator("#apply").waitFor();
+  const shown = await placesOf(tab, ["#apply", "#play-preview"]);
+  await textOf(tab, "#preview", /no limit is set/);
+  await textOf(tab, "#preview", /Corrections/);
+  await tab.waitForFunction(() => window.focalfleetPage.plate.targets !== null);
+  const [x, y] = await tab.evaluate(() => window.focalfleetPage.plate.targetOf(
+    window.focalfleetPage.plate.targets.keys().next().value));
+  assert.ok(Number.isFinite(x) && Number.isFinite(y), `a target at ${x}, ${y}`);
+  assert.deepEqual(await placesOf(tab, ["#apply", "#play-preview"]), shown);
+  assert.deepEqual(await placesOf(tab, ["#stop", "#sound", "#choose-file"]), before);
+
+  say("a configuration and its result move no button");
+  await tab.click("#apply");
+  await tab.waitForFunction(() => document.getElementById("preview").childElementCount === 0);
+  const idle = await placesOf(tab, kButtons);
+  await textOf(tab, "#configuration", /is under way/);
+  assert.deepEqual(await placesOf(tab, kButtons), idle, "it is under way");
+  await textOf(tab, "#configuration", /night-1.csv \(configuration 1\) is done/);
+  assert.deepEqual(await placesOf(tab, kButtons), idle, "its result is there");
+
+  say("all arrived and nothing measured: Worst says so");
+  await tab.click("#worst");
+  await textOf(tab, "#find-trouble", `All ${given.count} units arrived; errors not measured.`);
+  assert.equal(await tab.locator("#unit").innerText(), "");
+
+  await alarms(tab);
+  await mutes(tab);
+
+  say("header and legend count the same");
+  const words = (await tab.locator("#fleet-summary").innerText()).split(": ")[1].split(", ");
+  const legend = (await tab.locator("#legend li:not(.empty)").allInnerTexts())
+    .map((text) => text.replace(/\s+/g, " ").trim().split(":")[0]);
+  assert.deepEqual(words.toSorted(), legend.toSorted());
+
+  say("more units than a list has room for are counted");
+  await world("targets 7");
+  await dropFile(tab, "night-2.csv", targets());
+  await textOf(tab, "#preview", /1[23] targets not served[\s\S]*and [45] more units/);
+  await tab.screenshot({path: `${given.out}/preview-unserved.png`});
+  assert.deepEqual(await axeFindings(tab), []);
+  assert.deepEqual(tab.faults, []);
+}
