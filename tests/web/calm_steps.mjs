@@ -144,5 +144,18 @@ export async function calm(browser) {
   await textOf(tab, "#preview", /1[23] targets not served[\s\S]*and [45] more units/);
   await tab.screenshot({path: `${given.out}/preview-unserved.png`});
   assert.deepEqual(await axeFindings(tab), []);
+
+  say("what a stop says does not move it, on a wide and a tall screen");
+  await world("stop-daemon");
+  await textOf(tab, "#link", "no link");
+  for (const [width, height] of [[1400, 900], [768, 1024], [390, 844]]) {
+    await tab.setViewportSize({width, height});
+    await tab.evaluate(() => document.getElementById("stop-state").replaceChildren());
+    const {"#stop": at} = await placesOf(tab, ["#stop"]);
+    await tab.click("#stop");
+    await textOf(tab, "#stop-state", "NOT STOPPED");
+    assert.deepEqual(await placesOf(tab, ["#stop"]), {"#stop": at}, `${width} px wide`);
+    await tab.screenshot({path: `${given.out}/not-stopped-${width}.png`});
+  }
   assert.deepEqual(tab.faults, []);
 }

@@ -168,6 +168,7 @@ export async function past(browser) {
   assert.equal(disabled[0], 8, "colours.js, State");
   assert.ok(Number.isFinite(disabled[1]), "its arm is drawn");
   await textOf(tab, "#legend", /1disabled/);
+  await textOf(tab, "#legend-of", "Counts of the replay, not of the live fleet.");
   await tab.screenshot({path: `${given.out}/replay-disabled.png`});
   await tab.click("#player-close");
   assert.deepEqual(tab.faults, []);

@@ -15,7 +15,8 @@ function someOf(units) {
 
 export class AlarmEntry {
   constructor(alarms, {key, severity, muted, since}) {
-    Object.assign(this, {alarms, key, entry: null, shownText: "", runbookKey: ""});
+    Object.assign(this, {alarms, key, entry: null, shownText: "", runbookKey: "",
+      isOver: false});
     this.summary = make("summary");
     this.units = make("p");
     this.runbook = make("div");
@@ -47,8 +48,8 @@ export class AlarmEntry {
 
   /** Its alarms are over. The element stays until the pointer has left. */
   end() {
-    if (this.shownText === "over") return;
-    this.shownText = "over";
+    if (this.isOver) return;
+    this.isOver = true;
     this.item.classList.add("quiet");
     for (const button of this.item.querySelectorAll("button")) button.disabled = true;
     this.summary.querySelector(".hint").append(", no longer open");

@@ -160,7 +160,8 @@ export class Alarms {
     this.entries = new Map(kept.map((entry) => [entry.key, entry]));
     for (const entry of kept) if (!keys.has(entry.key)) entry.end();
     for (const entry of folded) {
-      const shown = before.get(entry.key) ?? new AlarmEntry(this, entry);
+      const known = before.get(entry.key);
+      const shown = known && !known.isOver ? known : new AlarmEntry(this, entry);
       shown.update(entry);
       this.entries.set(entry.key, shown);
     }

@@ -141,7 +141,7 @@ class Page {
     this.plate.setTheme(themes[select.value]);
     this.player.select(this.plate.selected);
     this.unit.showFilm();
-    find("legend-of").hidden = !film;
+    setText(find("legend-of"), film ? `Counts of the ${this.player.name}, not of the live fleet.` : "");
     this.showLegend();
   }
 
