@@ -141,6 +141,7 @@ export async function past(browser) {
   await tab.click("#commands summary");
   await textOf(tab, "#commands-list", /stop by token operator-page \(operator, http\)/);
   const times = await tab.locator("#commands-list .event .hint").allInnerTexts();
+  assert.ok(times.every((time) => time.trim().endsWith(" UTC")), times.join());
   assert.deepEqual(times, times.toSorted().reverse(), "the newest command first");
 
   say("nights side by side");

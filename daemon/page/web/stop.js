@@ -1,6 +1,6 @@
 // Stop: one press sends it, without a question. Each press sends it again.
 
-import {find, setText} from "/page/dom.js";
+import {find, make, setText} from "/page/dom.js";
 
 export class Stop {
   constructor(api, access) {
@@ -30,10 +30,10 @@ export class Stop {
   async send() {
     this.answeredIn = null;
     const number = ++this.sent;
-    const say = (text, isTrouble = false) => {
+    const say = (text, command = "") => {
       if (number !== this.sent) return;
-      setText(find("stop-state"), text);
-      find("stop-state").classList.toggle("trouble", isTrouble);
+      find("stop-state").replaceChildren(text, ...(command ? [make("code", {}, command)] : []));
+      find("stop-state").classList.toggle("trouble", command !== "");
     };
     say("Stop is sent …");
     try {
@@ -41,7 +41,7 @@ export class Stop {
       say(`Stop: the daemon has it (${new Date().toISOString().slice(11, 19)} UTC).`);
       this.answeredIn = this.configuration;
     } catch (error) {
-      say(`NOT STOPPED: ${error.message}. At the host: focalfleet stop --direct`, true);
+      say(`NOT STOPPED: ${error.message}. At the host: `, "focalfleet stop --direct");
       if (error.status === 401) this.access.open("Stop needs a token: any role may stop.");
     }
   }
