@@ -258,18 +258,18 @@ class Page {
       : `${down.length} not up: ${down.slice(0, 12).map(({bus_id}) => bus_id).join(", ")}`) + ".");
   }
 
-  /** The live fleet by states, in the legend's words. */
+  /** The live fleet by states, in the legend's words: troubles first, as the line may be cut short. */
   showSummary() {
     const {fleet, fleet: {facts}} = this;
     if (!facts) return;
     const counts = new Array(kStates.length).fill(0);
     for (let u = 0; u < fleet.count; ++u) ++counts[stateOf(fleet, u)];
     const text = `${counted(facts.units, "unit")}: ` + kStates.map(({text: name}, k) => [name, counts[k]])
-      .filter(([, count]) => count > 0).sort((a, b) => b[1] - a[1])
+      .filter(([, count]) => count > 0).reverse()
       .map(([name, count]) => `${count.toLocaleString("en")} ${name.split(":")[0]}`).join(", ");
     setText(find("fleet-summary"), (facts.store_failing
       ? "The store fails: nothing new may move. " : "") + text);
-    set(find("fleet-summary"), "title", text);  // it may be cut short
+    set(find("fleet-summary"), "title", text);
   }
 
   showLegend() {
