@@ -203,15 +203,26 @@ void FindGradients(const Campaign& campaign, CampaignFacts* facts) {
   facts->columns[std::string(kGradientY)] = Fill(gradient[1], campaign, facts->exposures);
 }
 
+// The first few units within reach of each unit, in the order of the table. The window along x keeps
+// the cost far below that of all pairs.
 std::vector<std::vector<std::size_t>> NeighboursOf(const Campaign& campaign, double reach_mm) {
-  std::vector<std::vector<std::size_t>> neighbours(campaign.units.size());
-  for (std::size_t u = 0; u < campaign.units.size(); ++u)
-    for (std::size_t v = 0; v < campaign.units.size() && neighbours[u].size() < kNeighboursMax;
-         ++v) {
-      const double dx = campaign.units[u].base_x_mm - campaign.units[v].base_x_mm;
-      const double dy = campaign.units[u].base_y_mm - campaign.units[v].base_y_mm;
-      if (u != v && dx * dx + dy * dy < reach_mm * reach_mm) neighbours[u].push_back(v);
+  const std::vector<CampaignUnit>& units = campaign.units;
+  std::vector<std::size_t> by_x(units.size());
+  std::iota(by_x.begin(), by_x.end(), std::size_t{0});
+  const auto x_mm = [&](std::size_t unit) { return units[unit].base_x_mm; };
+  std::ranges::sort(by_x, {}, x_mm);
+  std::vector<std::vector<std::size_t>> neighbours(units.size());
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    std::vector<std::size_t>& near = neighbours[u];
+    for (auto at = std::ranges::lower_bound(by_x, x_mm(u) - reach_mm, {}, x_mm);
+         at != by_x.end() && x_mm(*at) <= x_mm(u) + reach_mm; ++at) {
+      const double dx = x_mm(u) - x_mm(*at);
+      const double dy = units[u].base_y_mm - units[*at].base_y_mm;
+      if (u != *at && dx * dx + dy * dy < reach_mm * reach_mm) near.push_back(*at);
     }
+    std::ranges::sort(near);
+    near.resize(std::min(near.size(), kNeighboursMax));
+  }
   return neighbours;
 }
 
