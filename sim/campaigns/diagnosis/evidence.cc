@@ -22,7 +22,8 @@ using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
 
 constexpr double kSizes[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 100, 300, 1000};  // of the prior
-constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};  // of units that have it
+// Shares of units that have the effect: where nearly all do, one that shows little has it, too.
+constexpr double kShares[] = {1, 0.98, 0.9, 0.7, 0.4, 0.2, 0.05, 0.01, 0.002};
 constexpr double kOddsMax = 1e90;  // beyond it one of two summands is lost in the other's rounding
 constexpr double kFlat = 1e-9;  // of the largest curvature: a direction that the data do not show
 
@@ -277,7 +278,9 @@ ScatterFit Scatter(const Score& score, double prior_size, double dispersion, dou
   return best;
 }
 
-void TakeMixture(const Level& level, const MixtureFit& fit, Evidence* out) {
+// A unit whose geometry hides the effect tells nothing of it. The unit has it where most others do:
+// otherwise its geometry takes up what the effect does, and differs from the table for no reason.
+void TakeMixture(const Level& level, const Template& form, const MixtureFit& fit, Evidence* out) {
   out->sharing = level.sharing;
   out->log_evidence = fit.log_evidence;
   out->spread = fit.size;
@@ -288,10 +291,12 @@ void TakeMixture(const Level& level, const MixtureFit& fit, Evidence* out) {
   std::vector<double> evidence;
   SumTogether(level, fit.size, &evidence);
   for (std::size_t k = 0; k < level.groups.size(); ++k) {
-    if (level.groups[k].empty()) continue;
-    const double odds =
-        fit.share >= 1 ? 1
-                       : std::log(fit.share) - std::log1p(-fit.share) + evidence[level.as_one(k)];
+    const bool is_hidden = level.groups[k].empty();
+    // Without a shape of its own such a unit cannot have the effect.
+    if (is_hidden && (level.sharing != Sharing::kUnit || !form.shape_of_unit.empty())) continue;
+    const double odds = fit.share >= 1 ? 1
+                                       : std::log(fit.share) - std::log1p(-fit.share) +
+                                             (is_hidden ? 0 : evidence[level.as_one(k)]);
     group_has[k] = odds > 0 ? 1 : 0;
     if (group_has[k] != 0) out->chi_square += level.groups[k].chi_square;
   }
@@ -389,7 +394,7 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
   }
   for (const Level& level : levels) {
     const MixtureFit fit = Mix(level, prior);
-    if (fit.log_evidence > best.log_evidence) TakeMixture(level, fit, &best);
+    if (fit.log_evidence > best.log_evidence) TakeMixture(level, form, fit, &best);
   }
   if (units > 2 && c == 1 && !of_the_whole) {
     const ScatterFit scatter = Scatter(score, prior, best.dispersion,
@@ -398,7 +403,7 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
     if (scatter.log_evidence > best.log_evidence + 3) {
       best.sharing = Sharing::kUnit;
       best.log_evidence = scatter.log_evidence;
-      best.spread = 0;
+      best.spread = scatter.spread;
       best.scattered = true;
       best.chi_square = 0;
       for (std::size_t unit = 0; unit < units; ++unit) {

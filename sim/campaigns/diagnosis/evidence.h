@@ -24,7 +24,7 @@ struct Evidence {
   double chi_square = 0;    // explained at that level, by the units that have it
   double log_p = 0;         // the least of all levels, corrected for their number
   double dispersion = 1;    // of the noise along this template
-  double spread = 0;        // of the units' amplitudes, where they are their own
+  double spread = 0;        // of the units' amplitudes about 0, or about a mean (scattered)
   bool scattered = false;   // units' own amplitudes about a mean of the fleet
 };
 

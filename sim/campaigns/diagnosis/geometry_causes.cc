@@ -115,16 +115,39 @@ double Left(const UnitOffset& unit, const std::vector<Index>& rest) {
   return d.dot(c.ldlt().solve(d));
 }
 
-// rms of the group's offset at the fibre, um.
-double SizeAtFibre(const UnitOffset& unit, const Group& group, const CampaignUnit& geometry) {
-  double square = 0;
+// The square of a unit's offset, and the part of it that the error of the fit makes.
+struct Square {
+  double value = 0, of_error = 0;
+};
+
+// Of the group's offset, in its own unit or, with levers, at the fibre in um^2.
+Square SquareOf(const UnitOffset& unit, const Group& group, const CampaignUnit* levers) {
+  Square square;
   for (const Index at : group.at) {
-    double lever_mm = 1;
-    if (at == 4) lever_mm = std::hypot(geometry.arm_mm[0], geometry.arm_mm[1]) * kRadiansPerDegree;
-    if (at == 5) lever_mm = geometry.arm_mm[1] * kRadiansPerDegree;
-    square += unit.offset[at] * unit.offset[at] * lever_mm * lever_mm;
+    double lever = 1;
+    if (levers != nullptr) {
+      lever = kUmPerMm;
+      if (at == 4) lever *= std::hypot(levers->arm_mm[0], levers->arm_mm[1]) * kRadiansPerDegree;
+      if (at == 5) lever *= levers->arm_mm[1] * kRadiansPerDegree;
+    }
+    square.value += std::pow(unit.offset[at] * lever, 2);
+    square.of_error += unit.covariance(at, at) * lever * lever;
   }
-  return 1e3 * std::sqrt(square);
+  return square;
+}
+
+// The units' rms without what the errors of the fits make of it. A unit that tells little of itself
+// counts little.
+double RmsOfTruth(const std::vector<Square>& squares) {
+  std::vector<double> values;
+  for (const Square& square : squares) values.push_back(square.value);
+  const double usual = Median(values);
+  double sum = 0, weights = 0;
+  for (const Square& square : squares) {
+    const double weight = std::pow(std::max(square.of_error + usual, 1e-30), -2);
+    sum += weight * (square.value - square.of_error), weights += weight;
+  }
+  return weights > 0 ? std::sqrt(std::max(sum / weights, 0.0)) : 0;
 }
 
 struct GroupTest {
@@ -176,25 +199,23 @@ CauseFound Report(const Fit& fit, const std::vector<UnitOffset>& offsets, const 
   cause.amplitude_unit = group.unit;
   cause.delta_log_likelihood = test.gained / 2;
   cause.all_units = test.which.size() == offsets.size();
-  double square = 0, size = 0, variance = 0;
+  std::vector<Square> own, at_fibre;
+  double variance = 0;
   for (const std::size_t k : test.which) {
     const UnitOffset& unit = offsets[k];
     cause.units.push_back(fit.model.units[unit.unit].id);
-    for (const Index at : group.at) {
-      square += unit.offset[at] * unit.offset[at];
-      variance += unit.covariance(at, at);
-    }
-    const double um = SizeAtFibre(unit, group, fit.model.units[unit.unit]);
-    size += um * um;
+    own.push_back(SquareOf(unit, group, nullptr));
+    at_fibre.push_back(SquareOf(unit, group, &fit.model.units[unit.unit]));
+    variance += own.back().of_error;
   }
   const auto n = static_cast<double>(std::max<std::size_t>(test.which.size(), 1));
-  cause.amplitude = std::sqrt(square / n);
+  cause.amplitude = RmsOfTruth(own);
   if (test.which.size() == 1 && group.at.size() == 1)
     cause.amplitude = offsets[test.which[0]].offset[group.at[0]];
   const double sigma = std::sqrt(variance / n) / std::sqrt(n);
   cause.ci95[0] = cause.amplitude - 1.96 * sigma;
   cause.ci95[1] = cause.amplitude + 1.96 * sigma;
-  cause.size_um = std::sqrt(size / n);
+  cause.size_um = RmsOfTruth(at_fibre);
   cause.shape =
       cause.all_units && offsets.size() > 1 ? "each unit its own; the amplitude is their rms" : "";
   cause.paragraph = "The unit's geometry differs from units.csv: take the fitted value.";

@@ -76,6 +76,8 @@ std::string_view Name(Sharing sharing) {
 // spread between them is that of the moments of their scatter.
 // Source: DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177.
 AmplitudeSummary Summarise(const ModelTerm& term) {
+  constexpr double kToldMin = 0.1;  // of an amplitude, by the data; the rest is the prior's
+  if (term.has_mean && term.mean_sigma > 0) return {term.mean, term.mean_sigma};
   const std::size_t c = term.form.columns;
   struct Group {
     double value = 0;  // of one column; of several their root sum of squares
@@ -89,9 +91,16 @@ AmplitudeSummary Summarise(const ModelTerm& term) {
     double square = 0, sigma2 = 0;
     for (std::size_t k = 0; k < c; ++k) {
       const double a = term.amplitude[group * c + k], sigma = term.sigma[group * c + k];
-      square += a * a, sigma2 += sigma * sigma / static_cast<double>(c);
+      // The prior draws an amplitude towards its middle: here each counts as the data alone have
+      // it.
+      const double told = term.spread > 0 ? 1 - std::pow(sigma / term.spread, 2) : 1;
+      if (told < kToldMin) continue;
+      square += std::pow(a / told, 2), sigma2 += sigma * sigma / told / static_cast<double>(c);
     }
-    own.push_back({c == 1 ? term.amplitude[group] : std::sqrt(square), sigma2});
+    if (sigma2 == 0 && term.spread > 0) continue;
+    own.push_back(
+        {c == 1 ? std::copysign(std::sqrt(square), term.amplitude[group]) : std::sqrt(square),
+         sigma2});
   }
   // A group without an error has no data. Where none has one, nothing is known of the errors.
   const bool known = std::ranges::any_of(own, [](const Group& group) { return group.sigma2 > 0; });
@@ -118,7 +127,13 @@ AmplitudeSummary Summarise(const ModelTerm& term) {
       freedom > 0 && room > 1e-9 * weight ? std::max((scatter - freedom) / room, 0.0) : 0;
   AmplitudeSummary mean = mean_of(between2, itself);
   if (!known) mean.sigma = 0;
-  if (c > 1) return mean;
+  // Errors add to the length of several columns: the mean square less theirs is that of the truth.
+  if (c > 1) {
+    const AmplitudeSummary square = mean_of(between2, [&](const Group& group) {
+      return group.value * group.value - static_cast<double>(c) * group.sigma2;
+    });
+    return {known ? std::sqrt(std::max(square.value, 0.0)) : mean.value, mean.sigma};
+  }
   // Groups of either sign have no mean to speak of, and a size.
   const AmplitudeSummary square =
       mean_of(between2, [](const Group& group) { return group.value * group.value; });

@@ -35,6 +35,9 @@ struct ModelTerm {
   std::vector<double> amplitude;             // Shape: (groups, columns), flat
   std::vector<double> sigma;                 // standard deviation of each amplitude
   double spread = 0;  // standard deviation of the units' amplitudes, a prior; 0: none
+  // The units' amplitudes are spread about a mean that is fitted with them; else about 0.
+  bool has_mean = false;
+  double mean = 0, mean_sigma = 0;
 
   [[nodiscard]] std::size_t groups() const { return amplitude.size() / form.columns; }
   /// The unit's amplitudes, empty where it does not have the effect.

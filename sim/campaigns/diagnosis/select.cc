@@ -294,9 +294,9 @@ ModelTerm MakeTerm(const Template& form, const Evidence& evidence, const FleetGr
     if (evidence.has[unit] == 0) term.group_of_unit[unit] = kNoGroup;
   term.amplitude.assign(count * form.columns, 0);
   term.sigma.assign(count * form.columns, 0);
-  // The mixture's size is a grid point, so that the prior is made loose.
-  if (evidence.sharing == Sharing::kUnit && !evidence.scattered && units > 1)
-    term.spread = 3 * evidence.spread;
+  // The evidence's size is a grid point, so that the prior is made loose.
+  if (evidence.sharing == Sharing::kUnit && units > 1) term.spread = 3 * evidence.spread;
+  term.has_mean = evidence.scattered;
   return term;
 }
 
@@ -468,7 +468,7 @@ Templates NearTemplates(const Templates& library, const std::vector<Accepted>& a
 }  // namespace
 
 Selection Select(const Templates& library, const SelectionRule& rule, Fit* fit) {
-  constexpr std::size_t kManyRows = 100'000, kRowsKept = 60'000;
+  constexpr std::size_t kManyRows = 40'000, kRowsKept = 20'000;
   const Campaign& campaign = *fit->facts->campaign;
   if (campaign.rows() <= kManyRows) return SelectByAll(library, rule, fit);
   const std::size_t keep = campaign.units.size() * kRowsKept / campaign.rows();

@@ -36,6 +36,12 @@ void AppendOwn(const VectorXd& column, double prior, double value, UnitEquations
   eq->value[eq->own.cols() - 1] = value;
 }
 
+// The number of the term's amplitudes that several units have together.
+Index CountShared(const ModelTerm& term) {
+  if (term.sharing == Sharing::kUnit) return term.has_mean ? 1 : 0;
+  return static_cast<Index>(term.amplitude.size());
+}
+
 void AppendHomings(const Fit& fit, const WhiteUnit& white, UnitEquations* eq) {
   PoseErrors errors;
   VectorXd column(white.y.size());
@@ -67,13 +73,13 @@ UnitEquations MakeEquations(const Fit& fit, std::size_t unit, const WhiteUnit& w
     for (std::size_t c = 0; c < term.form.columns; ++c) {
       ApplyColumn(white.track, term.form, c, 1, &errors);
       WhiteDisplacement(white, errors, column.data());
-      if (term.sharing == Sharing::kUnit) {
+      if (term.sharing == Sharing::kUnit)
         AppendOwn(column, term.spread > 0 ? 1 / (term.spread * term.spread) : 0,
-                  term.amplitude[group * term.form.columns + c], &eq);
-      } else {
-        AppendColumn(column, &eq.shared);
-        eq.shared_at.push_back(shared_begin[t] + static_cast<Index>(group * term.form.columns + c));
-      }
+                  term.amplitude[group * term.form.columns + c] - term.mean, &eq);
+      if (CountShared(term) == 0) continue;
+      AppendColumn(column, &eq.shared);
+      const std::size_t of_group = term.has_mean ? 0 : group * term.form.columns + c;
+      eq.shared_at.push_back(shared_begin[t] + static_cast<Index>(of_group));
     }
   }
   AppendHomings(fit, white, &eq);
@@ -125,14 +131,18 @@ void Advance(double step, const Effect& effect, double* amplitude) {
   *amplitude = std::clamp(*amplitude + step, low, high);
 }
 
-void TakeOwn(const VectorXd& step, const VectorXd& sigma, std::size_t unit, Fit* fit) {
+// `mean_step`: of each term. Shape: (terms).
+void TakeOwn(const VectorXd& step, const VectorXd& sigma, const std::vector<double>& mean_step,
+             std::size_t unit, Fit* fit) {
   AddStatic(step.head<6>(), &fit->model.units[unit]);
   Index at = kStaticColumns;
-  for (ModelTerm& term : fit->model.terms) {
+  for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
+    ModelTerm& term = fit->model.terms[t];
     const std::uint32_t group = term.group_of_unit[unit];
     if (term.sharing != Sharing::kUnit || group == kNoGroup) continue;
     for (std::size_t c = 0; c < term.form.columns; ++c, ++at) {
-      Advance(step[at], *term.form.effect, &term.amplitude[group * term.form.columns + c]);
+      Advance(step[at] + mean_step[t], *term.form.effect,
+              &term.amplitude[group * term.form.columns + c]);
       term.sigma[group * term.form.columns + c] = sigma[at];
     }
   }
@@ -153,7 +163,7 @@ void StepFit(Fit* fit) {
   Index shared_count = 0;
   for (const ModelTerm& term : fit->model.terms) {
     shared_begin.push_back(shared_count);
-    if (term.sharing != Sharing::kUnit) shared_count += static_cast<Index>(term.amplitude.size());
+    shared_count += CountShared(term);
   }
   const std::vector<UnitChunk> chunks = ChunksOf(units);
   std::vector<UnitSolution> solutions(units);
@@ -180,8 +190,14 @@ void StepFit(Fit* fit) {
                        .cwiseMax(0)
                        .cwiseSqrt();
   }
+  std::vector<double> mean_step(fit->model.terms.size(), 0);
   for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
     ModelTerm& term = fit->model.terms[t];
+    if (term.has_mean) {
+      mean_step[t] = shared[shared_begin[t]];
+      term.mean += mean_step[t];
+      term.mean_sigma = shared_sigma[shared_begin[t]];
+    }
     if (term.sharing == Sharing::kUnit) continue;
     for (std::size_t k = 0; k < term.amplitude.size(); ++k) {
       Advance(shared[shared_begin[t] + static_cast<Index>(k)], *term.form.effect,
@@ -200,7 +216,7 @@ void StepFit(Fit* fit) {
       const Index n = step.size();
       const VectorXd sigma =
           solution.own.solve(MatrixXd::Identity(n, n)).diagonal().cwiseMax(0).cwiseSqrt();
-      TakeOwn(step, sigma, unit, fit);
+      TakeOwn(step, sigma, mean_step, unit, fit);
     }
   });
   UpdateResiduals(fit);
@@ -254,11 +270,37 @@ double CountParameters(const Fit& fit) {
   return parameters;
 }
 
+// The price of units' own amplitudes is that of their marginal likelihood (Laplace), with the
+// spread that they have: ln(1 + s^2 / sigma^2) + a^2 / (s^2 + sigma^2) each, about their mean.
+// BIC's ln n, with the rows of all units, would count rows that say nothing of an amplitude. The
+// prior's width is no part of it, so that terms with different priors compare.
+double PriceOfOwn(const ModelTerm& term) {
+  double square = 0, count = 0;
+  const auto from_mean2 = [&](std::size_t k) { return std::pow(term.amplitude[k] - term.mean, 2); };
+  for (std::size_t k = 0; k < term.amplitude.size(); ++k)
+    if (term.sigma[k] > 0) square += from_mean2(k) - std::pow(term.sigma[k], 2), count += 1;
+  if (count == 0) return 0;
+  const double spread2 = std::max(square / count, 0.0);
+  double price = 0;
+  for (std::size_t k = 0; k < term.amplitude.size(); ++k) {
+    const double sigma2 = std::pow(term.sigma[k], 2);
+    if (sigma2 > 0) price += std::log1p(spread2 / sigma2) + from_mean2(k) / (spread2 + sigma2);
+  }
+  return price;
+}
+
 double PriceOf(const Fit& fit) {
   double values = 0;
   for (std::size_t row = 0; row < fit.weight.size(); ++row)
     if (fit.Used(row)) values += 2;
-  return CountParameters(fit) * std::log(std::max(values, 2.0));
+  double parameters = CountParameters(fit), own = 0;
+  for (const ModelTerm& term : fit.model.terms) {
+    if (!(term.spread > 0)) continue;
+    for (const double sigma : term.sigma) parameters -= sigma > 0 ? 1 : 0;
+    parameters += term.has_mean ? 2 : 1;  // the spread, and the mean
+    own += PriceOfOwn(term);
+  }
+  return parameters * std::log(std::max(values, 2.0)) + own;
 }
 
 double NegativeBic(const Fit& fit) {

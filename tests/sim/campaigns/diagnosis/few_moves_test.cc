@@ -43,5 +43,18 @@ TEST(FewMoves, ExposuresOfFewUnitsHaveTheNoiseOfAll) {
   }
 }
 
+// In some units the moves hide an eccentricity behind zeros and arms. These units have it, too:
+// otherwise their zeros take it up, and differ from the table for no reason.
+TEST(FewMoves, UnitsWhoseGeometryHidesTheEffectHaveItToo) {
+  const Campaign campaign =
+      Planted({{"eccentricity", 0.05, "phi"}}, {.units = 150, .moves = 24, .seed = 5});
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "eccentricity");
+  EXPECT_EQ(diagnosis.causes[0].units.size(), campaign.units.size());
+  // Each unit's own errors make the length of its two amplitudes too long.
+  EXPECT_NEAR(diagnosis.causes[0].amplitude, 0.05, 0.005);
+}
+
 }  // namespace
 }  // namespace focalfleet::sim
