@@ -120,7 +120,7 @@ struct Square {
   double value = 0, of_error = 0;
 };
 
-// Of the group's offset, in its own unit or, with levers, at the fibre in um^2.
+// The square of the group's offset in its own unit or, with levers, at the fibre in um^2.
 Square SquareOf(const UnitOffset& unit, const Group& group, const CampaignUnit* levers) {
   Square square;
   for (const Index at : group.at) {

@@ -76,7 +76,7 @@ std::string_view Name(Sharing sharing) {
 // spread between them is that of the moments of their scatter.
 // Source: DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177.
 AmplitudeSummary Summarise(const ModelTerm& term) {
-  constexpr double kToldMin = 0.1;  // of an amplitude, by the data; the rest is the prior's
+  constexpr double kByDataMin = 0.1;  // of an amplitude, by the data; the rest is the prior's
   if (term.has_mean && term.mean_sigma > 0) return {term.mean, term.mean_sigma};
   const std::size_t c = term.form.columns;
   struct Group {
@@ -89,15 +89,17 @@ AmplitudeSummary Summarise(const ModelTerm& term) {
   std::vector<Group> own;
   for (const std::uint32_t group : groups) {
     double square = 0, sigma2 = 0;
+    bool tells = false;
     for (std::size_t k = 0; k < c; ++k) {
       const double a = term.amplitude[group * c + k], sigma = term.sigma[group * c + k];
-      // The prior draws an amplitude towards its middle: here each counts as the data alone have
-      // it.
-      const double told = term.spread > 0 ? 1 - std::pow(sigma / term.spread, 2) : 1;
-      if (told < kToldMin) continue;
-      square += std::pow(a / told, 2), sigma2 += sigma * sigma / told / static_cast<double>(c);
+      // The prior draws an amplitude towards its middle: each counts as the data alone have it.
+      const double by_data = term.spread > 0 ? 1 - std::pow(sigma / term.spread, 2) : 1;
+      if (by_data < kByDataMin) continue;
+      tells = true;
+      square += std::pow(a / by_data, 2);
+      sigma2 += sigma * sigma / by_data / static_cast<double>(c);
     }
-    if (sigma2 == 0 && term.spread > 0) continue;
+    if (!tells) continue;
     own.push_back(
         {c == 1 ? std::copysign(std::sqrt(square), term.amplitude[group]) : std::sqrt(square),
          sigma2});

@@ -203,8 +203,8 @@ void FindGradients(const Campaign& campaign, CampaignFacts* facts) {
   facts->columns[std::string(kGradientY)] = Fill(gradient[1], campaign, facts->exposures);
 }
 
-// The first few units within reach of each unit, in the order of the table. The window along x keeps
-// the cost far below that of all pairs.
+// The first few units within reach of each unit, in the order of the table. The window along x
+// keeps the cost far below that of all pairs.
 std::vector<std::vector<std::size_t>> NeighboursOf(const Campaign& campaign, double reach_mm) {
   const std::vector<CampaignUnit>& units = campaign.units;
   std::vector<std::size_t> by_x(units.size());

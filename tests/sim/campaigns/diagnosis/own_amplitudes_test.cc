@@ -40,7 +40,7 @@ TEST(OwnAmplitudes, UnitsThatAreAlikeCostHardlyMoreThanOneAmplitude) {
   const Fit each =
       WithTerm(facts, "backlash", EffectAxis::kTheta,
                {.sharing = Sharing::kUnit, .has = all, .spread = 0.0005, .scattered = true});
-  // By BIC with the rows of all units the sixty amplitudes would cost 480.
+  // BIC with the rows of all units would ask 480 for the sixty amplitudes.
   EXPECT_LT(std::abs(BetterBy(one, each)), 10);
   const ModelTerm& term = each.model.terms[0];
   EXPECT_NEAR(term.mean, kPlay_deg, 4 * term.mean_sigma);
