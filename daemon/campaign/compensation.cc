@@ -19,7 +19,7 @@ constexpr std::size_t kRestsMax = 32;
 constexpr std::size_t kRestsKept = 8;  // effects that fade have faded by then
 
 bool IsCompensated(const sim::Template& form) {
-  return form.axis != sim::EffectAxis::kNone && sim::IsOfPosesAlone(*form.effect);
+  return form.axis != sim::EffectAxis::kNone && sim::IsOfPosesAlone(form);
 }
 
 }  // namespace

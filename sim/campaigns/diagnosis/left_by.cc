@@ -26,8 +26,7 @@ UnitLeft LeftBy(const CampaignModel& model, const Campaign& campaign, std::size_
   errors.Reset(track.moves());
   for (const ModelTerm& term : model.terms) {
     const std::span<const double> amplitude = term.AmplitudeOf(unit);
-    if (amplitude.empty() || term.form.memory != Memory::kChain ||
-        !IsOfPosesAlone(*term.form.effect))
+    if (amplitude.empty() || term.form.memory != Memory::kChain || !IsOfPosesAlone(term.form))
       continue;
     term.form.effect->apply(track.track(), term.form, amplitude, &errors);
   }

@@ -36,7 +36,8 @@ Effect MakeAxisCrosstalk() {
               "Moving one axis turns the other a little: the fibre bundle's torque, a shared "
               "shaft, or a bearing's drag. Move the axes one after the other to see it.",
           .list = ListAxisCrosstalk,
-          .apply = ApplyAxisCrosstalk};
+          .apply = ApplyAxisCrosstalk,
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

@@ -52,7 +52,8 @@ Effect MakeAxisTilt() {
               "two periods a turn, along one direction. The lean is the unit's own; a "
               "distortion of the camera looks alike on one unit, not on a plate full of them.",
           .list = ListAxisTilt,
-          .apply = ApplyAxisTilt};
+          .apply = ApplyAxisTilt,
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

@@ -44,6 +44,7 @@ Effect MakeBacklash() {
               "reversal.",
           .list = ListBacklash,
           .apply = ApplyBacklash,
+          .of_poses_alone = EachForm,
           .continuous_shape = true,
           .amplitude_is_shape = true};
 }

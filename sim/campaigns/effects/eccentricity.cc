@@ -25,7 +25,8 @@ Effect MakeEccentricity() {
               "of one period a turn, the same in both directions. Its phase is the unit's "
               "own.",
           .list = ListEccentricity,
-          .apply = ApplyEccentricity};
+          .apply = ApplyEccentricity,
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

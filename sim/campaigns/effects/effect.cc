@@ -122,6 +122,10 @@ std::span<const std::size_t> AxesOf(const Template& form) {
   return std::span(kAxes).subspan(AxisIndex(form), 1);
 }
 
+bool IsOfPosesAlone(const Template& form) {
+  return form.effect->of_poses_alone != nullptr && form.effect->of_poses_alone(form);
+}
+
 bool Shows(const CampaignFacts& facts, const Template& form) {
   return form.effect->shows == nullptr || form.effect->shows(form, facts);
 }

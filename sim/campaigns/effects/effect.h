@@ -94,6 +94,9 @@ struct Effect {
   std::string_view paragraph;           // for the operator
   void (*list)(const CampaignFacts&, Templates*);
   void (*apply)(const UnitTrack&, const Template&, std::span<const double> amplitude, PoseErrors*);
+  // Whether this form depends on the unit's own poses alone, and moves nothing but the unit: it
+  // reads no column, not even a computed one. nullptr: no form does.
+  bool (*of_poses_alone)(const Template&) = nullptr;
   // Adds shapes beside the listed ones, of one column, on each axis that `list` has. They are too
   // many to score each (quick_look.h). nullptr: the effect has no more.
   void (*glance)(Templates*) = nullptr;
@@ -116,6 +119,11 @@ struct Effect {
   // Causes whose trace this one may pass for where one of `needs` is missing from the campaign.
   std::vector<std::string_view> passes_for = {};
 };
+
+/// The `of_poses_alone` of an effect whose forms are all so.
+inline bool EachForm(const Template& /*form*/) { return true; }
+/// Whether the form depends on the unit's own poses alone (Effect::of_poses_alone).
+bool IsOfPosesAlone(const Template& form);
 
 /// Whether these moves can distinguish the effect's own shape.
 bool Shows(const CampaignFacts& facts, const Template& form);

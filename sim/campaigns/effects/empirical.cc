@@ -117,7 +117,8 @@ const Effect& EmpiricalRipple() {
                              .prior_size = 0.05,
                              .owner = Owner::kUnit,
                              .list = ListNone,
-                             .apply = ApplyRipple};
+                             .apply = ApplyRipple,
+                             .of_poses_alone = EachForm};
   return effect;
 }
 

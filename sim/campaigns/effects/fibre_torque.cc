@@ -54,6 +54,7 @@ Effect MakeFibreTorque() {
               "not quite the same on the way back. Re-route the fibre or limit the range.",
           .list = ListFibreTorque,
           .apply = ApplyFibreTorque,
+          .of_poses_alone = EachForm,
           .continuous_shape = true};
 }
 

@@ -40,6 +40,7 @@ Effect MakeFrictionWindup() {
               "moves after a reversal err less than long ones.",
           .list = ListFrictionWindup,
           .apply = ApplyFrictionWindup,
+          .of_poses_alone = EachForm,
           .continuous_shape = true};
 }
 

@@ -32,6 +32,7 @@ Effect MakeGearScale() {
               "ratio, and look at the gear if one unit stands out.",
           .list = ListGearScale,
           .apply = ApplyGearScale,
+          .of_poses_alone = EachForm,
           .amplitude_low = -1,  // an axis that stands still
           .amplitude_high = 0.5};
 }

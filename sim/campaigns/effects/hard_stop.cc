@@ -48,6 +48,7 @@ Effect MakeHardStop() {
               "before it, begins earlier than the table says. Narrow the range of this unit.",
           .list = ListHardStop,
           .apply = ApplyHardStop,
+          .of_poses_alone = EachForm,
           .continuous_shape = true};
 }
 

@@ -35,6 +35,8 @@ void ListModeThreshold(const CampaignFacts& facts, Templates* out) {
   }
 }
 
+bool ReadsNoMode(const Template& form) { return form.form < kOfMode; }
+
 // Shows what the mode's column says. An error of nearly all moves is another cause's, and so is one
 // of hardly any.
 bool ShowsMode(const Template& form, const CampaignFacts& facts) {
@@ -50,7 +52,7 @@ bool ShowsMode(const Template& form, const CampaignFacts& facts) {
 // than the threshold.
 bool ShowsModeThreshold(const Template& form, const CampaignFacts& facts) {
   constexpr double kLonger = 0.7;  // of the axis' moves
-  if (form.form >= kOfMode) return ShowsMode(form, facts);
+  if (!ReadsNoMode(form)) return ShowsMode(form, facts);
   if (form.memory != Memory::kChain) return true;
   double moves = 0, longer = 0;
   for (const double step : facts.step_deg[AxisIndex(form)]) {
@@ -64,7 +66,7 @@ void ApplyModeThreshold(const UnitTrack& track, const Template& form,
                         std::span<const double> amplitude, PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
-  const bool by_column = form.form >= kOfMode;
+  const bool by_column = !ReadsNoMode(form);
   if (by_column && !track.facts->Has(kMode)) return;  // a model of another campaign
   const std::span<const double> mode = by_column ? track.Column(kMode) : step;
   AddRemembered(
@@ -90,6 +92,7 @@ Effect MakeModeThreshold() {
               "cruise), which ends a little elsewhere: the error steps at that length.",
           .list = ListModeThreshold,
           .apply = ApplyModeThreshold,
+          .of_poses_alone = ReadsNoMode,
           .continuous_shape = true,
           .shows = ShowsModeThreshold};
 }

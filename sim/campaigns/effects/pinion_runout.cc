@@ -28,7 +28,8 @@ Effect MakePinionRunout() {
               "periods a turn with an output stage, of 4.29 without. The two turn together, so "
               "that nothing but a gear of its own tells them apart.",
           .list = ListPinionRunout,
-          .apply = ApplyPinionRunout};
+          .apply = ApplyPinionRunout,
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

@@ -8,17 +8,6 @@
 
 namespace focalfleet::sim {
 
-bool IsOfPosesAlone(const Effect& effect) {
-  // The list is by name, because it is a fact about the code of an effect: these read no column,
-  // not even a computed one.
-  static constexpr std::string_view kCauses[] = {
-      "axis_crosstalk", "axis_tilt",       "backlash",        "eccentricity", "empirical_ripple",
-      "fibre_torque",   "friction_windup", "gear_scale",      "hard_stop",    "mode_threshold",
-      "pinion_runout",  "ramp_travel",     "scale_asymmetry", "stage_ripple", "stiction",
-      "tooth_damage",   "tooth_mesh"};
-  return std::find(std::begin(kCauses), std::end(kCauses), effect.cause) != std::end(kCauses);
-}
-
 PoseTrack::PoseTrack(const CampaignUnit& unit, const AxisPair& begin_deg)
     : unit_(unit), begin_deg_(begin_deg) {}
 

@@ -10,9 +10,6 @@
 
 namespace focalfleet::sim {
 
-/// Whether the effect depends on the unit's own poses alone, and moves nothing but the unit.
-bool IsOfPosesAlone(const Effect& effect);
-
 class PoseTrack {
  public:
   using AxisPair = std::array<double, 2>;  // degrees, theta and phi

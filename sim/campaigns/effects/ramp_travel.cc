@@ -44,6 +44,7 @@ Effect MakeRampTravel() {
               "all moves have one length it looks like a scale error.",
           .list = ListRampTravel,
           .apply = ApplyRampTravel,
+          .of_poses_alone = EachForm,
           .amplitude_low = -10,
           .amplitude_high = 10};
 }

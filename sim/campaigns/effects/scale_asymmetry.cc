@@ -32,7 +32,8 @@ Effect MakeScaleAsymmetry() {
               "creeps with every back and forth. Friction or a load with a preferred "
               "direction does this; so does a supply that is weaker one way.",
           .list = ListScaleAsymmetry,
-          .apply = ApplyScaleAsymmetry};
+          .apply = ApplyScaleAsymmetry,
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

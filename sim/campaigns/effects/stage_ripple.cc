@@ -30,7 +30,8 @@ Effect MakeStageRipple() {
               "A carrier inside the planetary gearhead is off centre: a ripple with the order "
               "of its stage (11.3, 48.6 or 208 a turn with a pinion stage behind it).",
           .list = ListStageRipple,
-          .apply = ApplyStageRipple};
+          .apply = ApplyStageRipple,
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

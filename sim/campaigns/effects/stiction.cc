@@ -59,6 +59,7 @@ Effect MakeStiction() {
               "where it was. Avoid short corrections, or overshoot and come back.",
           .list = ListStiction,
           .apply = ApplyStiction,
+          .of_poses_alone = EachForm,
           .continuous_shape = true,
           .amplitude_low = 0,
           .amplitude_high = 1.2,

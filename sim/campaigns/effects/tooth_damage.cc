@@ -63,6 +63,7 @@ Effect MakeToothDamage() {
               "passes that tooth, at the same place each turn of it and in both directions.",
           .list = ListToothDamage,
           .apply = ApplyToothDamage,
+          .of_poses_alone = EachForm,
           .continuous_shape = true,
           .own_shape = true,
           .shows = ShowsToothDamage};

@@ -42,7 +42,8 @@ Effect MakeToothMesh() {
               "(order 45), or of the last ring (46 teeth, order 122 with a pinion stage), alike "
               "all around or deeper on one side.",
           .list = ListToothMesh,
-          .apply = ApplyToothMesh};
+          .apply = ApplyToothMesh,
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim
