@@ -289,6 +289,15 @@ double PriceOfOwn(const ModelTerm& term) {
   return price;
 }
 
+// The price of choosing which units have a term, with any number of them as likely: so many choices
+// fit by chance.
+double PriceOfUnits(const ModelTerm& term) {
+  const auto units = static_cast<double>(term.group_of_unit.size());
+  const auto without = static_cast<double>(std::ranges::count(term.group_of_unit, kNoGroup));
+  if (without == 0) return 0;
+  return 2 * (std::lgamma(units + 2) - std::lgamma(without + 1) - std::lgamma(units - without + 1));
+}
+
 double PriceOf(const Fit& fit) {
   double values = 0;
   for (std::size_t row = 0; row < fit.weight.size(); ++row)
@@ -298,7 +307,7 @@ double PriceOf(const Fit& fit) {
     if (!(term.spread > 0)) continue;
     for (const double sigma : term.sigma) parameters -= sigma > 0 ? 1 : 0;
     parameters += term.has_mean ? 2 : 1;  // the spread, and the mean
-    own += PriceOfOwn(term);
+    own += PriceOfOwn(term) + PriceOfUnits(term);
   }
   return parameters * std::log(std::max(values, 2.0)) + own;
 }
