@@ -54,7 +54,8 @@ MetricsSampler::MetricsSampler(Parts parts)
 void MetricsSampler::Note(const FleetView& view, const Effects& effects) {
   NoteConfiguration(view);
   for (const Row& row : effects.rows) {
-    if (const auto* alarm = std::get_if<AlarmRow>(&row))
+    // An alarm of no times is another text for one that was counted.
+    if (const auto* alarm = std::get_if<AlarmRow>(&row); alarm != nullptr && alarm->times > 0)
       ++alarms_by_name_[static_cast<std::size_t>(KindOf(alarm->name).name)];
     const auto* measurement = std::get_if<MeasurementRow>(&row);
     if (measurement == nullptr || !measurement->place) continue;

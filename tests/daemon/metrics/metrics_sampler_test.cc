@@ -86,7 +86,8 @@ TEST_F(MetricsSamplerTest, CountsAlarmsByName) {
   Effects effects;
   effects.rows = {AlarmRow{.id = 1, .name = AlarmName::kBusDown},
                   AlarmRow{.id = 2, .name = AlarmName::kUnitSilent},
-                  AlarmRow{.id = 3, .name = AlarmName::kBusDown}};
+                  AlarmRow{.id = 3, .name = AlarmName::kBusDown},
+                  AlarmRow{.id = 4, .name = AlarmName::kUnitSilent, .times = 0}};
   Note(std::move(effects));
   const auto sample = Sample({0});
   EXPECT_EQ(sample->alarms_by_name[static_cast<std::size_t>(AlarmName::kBusDown)], 2u);
