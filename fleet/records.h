@@ -195,7 +195,7 @@ struct AlarmRow {
   std::optional<BusId> bus;
   std::string text;
   AlarmName name = AlarmName::kUnnamed;
-  std::uint32_t times = 1;  // equal ones that are folded into it. Not stored: the text has it
+  std::uint32_t times = 1;  // equal ones that are folded into it; 0: a new text alone. Not stored
 };
 
 /// The condition of an alarm has ended. The shell closes the open alarm; the store has no row.

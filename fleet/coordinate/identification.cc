@@ -285,11 +285,12 @@ void Identify(const Coordination& fleet, PositionerIndex i) {
 }
 
 void NameFault(const Coordination& fleet, PositionerIndex i, FaultCode fault) {
-  std::optional<FaultCode>& named = fleet.units[i].trouble.named_fault;
-  if (fault == FaultCode::kNone || !fleet.ledger.alarms().Lasts(AlarmName::kUnitFault, i)) return;
-  if (named && *named != fault)
-    fleet.ledger.alarms().Explain(AlarmName::kUnitFault, i,
-                                  fleet.units.NameOf(i) + " is in fault: " + Name(fault));
+  FaultCode& named = fleet.units[i].trouble.named_fault;
+  if (fault == FaultCode::kNone || fault == named ||
+      !fleet.ledger.alarms().Lasts(AlarmName::kUnitFault, i))
+    return;
+  fleet.ledger.alarms().Explain(AlarmName::kUnitFault, i,
+                                fleet.units.NameOf(i) + " is in fault: " + Name(fault));
   named = fault;
 }
 

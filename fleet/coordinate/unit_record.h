@@ -73,8 +73,8 @@ struct UnitTrouble {
   std::string unfit;
   std::optional<std::uint8_t> other_version;  // of the protocol, in its last identity
   bool no_serial = false;                     // its serial number was 0 in its last identity
-  /// The fault that its alarm names; kNone: that is not known yet. No value: an earlier run's does.
-  std::optional<FaultCode> named_fault;
+  /// The fault that its alarm names, also one of an earlier run; kNone: the alarm names none yet.
+  FaultCode named_fault = FaultCode::kNone;
   std::string not_kept;  // why the store refuses its rows; empty: it does not. Kept in kFault.
 };
 

@@ -1,11 +1,25 @@
 #include "fleet/coordinate/unit_table.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "protocol/base/check.h"
 
 namespace focalfleet {
+namespace {
+
+/// The fault that the text of an alarm names; kNone: it names none.
+FaultCode FaultIn(const std::string& text) {
+  for (std::uint8_t code = 1; code < kFaultCodeCount; ++code) {
+    const std::string name = Name(FaultCode{code});
+    for (const char* before : {"in fault: ", "reports fault "})
+      if (text.find(before + name) != std::string::npos) return FaultCode{code};
+  }
+  return FaultCode::kNone;
+}
+
+}  // namespace
 
 UnitTable::UnitTable(const Layout& layout_in, std::vector<UnitDrive> drives_in,
                      const BusRates& rates, const StoredFleet& stored, const StepState& step)
@@ -39,6 +53,11 @@ void UnitTable::Take(const StoredFleet& stored) {
       view.enabled = false;
       view.disabled_reason = row.reason;
     }
+  }
+  for (const auto& row : stored.open_alarms) {
+    const auto i = row.unit ? layout.Find(*row.unit) : std::nullopt;
+    if (i && row.name == AlarmName::kUnitFault)
+      units_[i->value].trouble.named_fault = FaultIn(row.text);
   }
   for (const auto& row : stored.parameters) {
     const auto place = place_of.find(row.serial);

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/scenario/in_process_fleet.h"
@@ -66,6 +67,29 @@ TEST(Configuration, CutHomingIsNotAPlace) {
     ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
       fleet->world().disturb().RaiseFault(fleet->id(4), FaultCode::kDriver);
     });
+  }
+}
+
+// An earlier run may have ended before it knew the fault, and the fault may be another one since.
+TEST(Configuration, AfterARestartTheAlarmOfAUnitNamesItsFaultOnce) {
+  const std::string named = std::string("unit 5 is in fault: ") + Name(FaultCode::kDriver);
+  const std::string other = std::string("unit 5 is in fault: ") + Name(FaultCode::kFlash);
+  for (const auto& [text, renews] :
+       {std::pair(std::string("unit 5 stopped with a fault (was moving)"), true),
+        std::pair(other, true), std::pair(named + " (2 of its kind in 60 s)", false),
+        std::pair(std::string("unit 5 reports fault ") + Name(FaultCode::kDriver), false)}) {
+    InProcessFleet fleet(Small(41));
+    fleet.Run(Seconds(2));
+    fleet.world().disturb().RaiseFault(fleet.id(4), FaultCode::kDriver);
+    fleet.Run(Seconds(5));
+    fleet.store().fleet.open_alarms = {
+        {.id = 1, .name = AlarmName::kUnitFault, .unit = fleet.id(4), .text = text}};
+    fleet.store().alarms.clear();
+    fleet.Restart();
+    fleet.Run(Seconds(10));
+    EXPECT_EQ(fleet.coordinator().unit({4}).phase, UnitPhase::kFault) << text;
+    EXPECT_EQ(HasAlarm(fleet, named), renews) << text;
+    EXPECT_EQ(fleet.store().alarms.size(), renews ? 1u : 0u) << text;
   }
 }
 
