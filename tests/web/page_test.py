@@ -41,6 +41,8 @@ def world(fleet, line):
         fleet.sim("silence", "--units", arguments[0])
     elif word == "revoke":
         fleet.cli("token", "revoke", arguments[0], "--file", "tokens.csv")
+    elif word == "apply":  # as another operator does
+        fleet.cli("apply", "targets.csv")
     elif word == "targets":  # from where the units stand now
         (fleet.folder / "now.csv").write_text(fleet.cli("state"))
         fleet.cli("targets", "--units", "units.csv", "--from", "now.csv", "--seed", arguments[0],

@@ -130,7 +130,9 @@ export async function tasks(browser) {
     await hand.click("#apply");
     await hand.answer("#progress-text", /to its planned end/);
   });
-  await textOf(tab, "#configuration", /tuesday.csv \(configuration 2\) is done/);
+  const result = await textOf(tab, "#configuration", /tuesday.csv \(configuration 2\) is done/);
+  const [, makespan] = /It took (.*), planned/.exec(result);
+  await textOf(tab, "#configuration", /Not served\s*1: disabled: its gear is worn\s*5\s*Farthest/);
   await task(hand, "Find why unit 5 was not served", async () => {
     await hand.type("#find-id", "5");
     await hand.press("Enter");
@@ -179,6 +181,7 @@ export async function tasks(browser) {
   const nights = await tab.locator("#nights-table tbody tr").allInnerTexts();
   assert.equal(nights.length, 2, nights.join("\n"));
   assert.match(nights[1], /100\.0 %/);
+  assert.ok(nights[0].includes(`\t${makespan}\t`), `${nights[0]}: one that was stopped has no makespan`);
   await tab.screenshot({path: `${given.out}/nights.png`});
   assert.equal(rows.length, 10);
   assert.deepEqual(tab.faults, []);

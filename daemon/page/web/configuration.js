@@ -39,7 +39,9 @@ export class Configuration {
     this.facts = null;
     this.file = null;
     this.preview = null;
+    this.previewedAfter = undefined;  // the newest configuration then
     this.isShown = false;  // its plan is on the plate
+    this.isApplied = false;  // it was commanded, and the daemon has not answered yet
     this.resultOf = "";  // the configuration whose result is shown
     find("choose-file").addEventListener("click", () => find("file").click());
     find("file").addEventListener("change", () => {
@@ -93,12 +95,14 @@ export class Configuration {
       this.say(make("p", {class: "trouble", role: "alert"}, `${file.name} is larger than 12 MB.`));
       return;
     }
-    this.file = {source: file.name, targets_csv: await file.text()};
-    if (this.isShown) this.player.close();
+    this.clear();  // of another file
+    const taken = this.file = {source: file.name, targets_csv: await file.text()};
     this.say(make("p", {}, `${file.name}: a way is being planned. Nothing moves …`));
     try {
-      this.show(await this.api.ask("preview", this.file));
+      const preview = await this.api.ask("preview", taken);
+      if (taken === this.file) this.show(preview);
     } catch (error) {
+      if (taken !== this.file) return;
       this.say(make("p", {class: "trouble", role: "alert"}, `${error.message}`),
           this.dismissButton());
     }
@@ -116,6 +120,7 @@ export class Configuration {
 
   show(preview) {
     this.preview = preview;
+    this.previewedAfter = this.facts?.configuration.id;
     const {fleet} = this.plate;
     this.plate.marked = preview.unserved.map(({unit_id}) => fleet.placeOf.get(unit_id))
       .filter((u) => u !== undefined);
@@ -166,6 +171,15 @@ export class Configuration {
     }
   }
 
+  /** Another configuration has begun: the preview begins where units will no longer stand. */
+  outdate() {
+    this.preview.isOld = true;
+    this.plate.showTargets(null);
+    if (this.isShown) this.player.close();
+    if (find("play-preview")) find("play-preview").disabled = true;
+    setText(find("apply-trouble"), "Another configuration has begun since: preview the file again.");
+  }
+
   /** The motion of the preview's plan. */
   async motionOf(preview) {
     const bytes = await this.api.bytes(`/preview-motion?plan=${preview.plan}`);
@@ -177,7 +191,7 @@ export class Configuration {
   async addTargets(preview) {
     try {
       const {units} = preview.motion = await this.motionOf(preview);
-      if (preview !== this.preview) return;
+      if (preview !== this.preview || preview.isOld) return;
       this.plate.showTargets(new Map([...units].map(([u, {end}]) => [u, end])));
     } catch {
       // Another preview came since: the plate shows its targets.
@@ -205,6 +219,7 @@ export class Configuration {
 
   async apply(button, corrections) {
     button.disabled = true;
+    this.isApplied = true;
     const args = corrections === "" ? this.file
       : {...this.file, corrections: Number(corrections)};
     try {
@@ -213,6 +228,8 @@ export class Configuration {
     } catch (error) {
       setText(find("apply-trouble"), error.message);
       button.disabled = false;
+    } finally {
+      this.isApplied = false;
     }
   }
 
@@ -223,6 +240,8 @@ export class Configuration {
     const c = facts.configuration;
     const over = !facts.busy;
     this.showProgress();
+    if (this.preview && !this.preview.isOld && !this.isApplied && c.id !== this.previewedAfter)
+      this.outdate();
     const key = `${c.id} ${c.state} ${over}`;
     if (over && c.id > 0 && key !== this.resultOf) {
       this.resultOf = key;
@@ -255,6 +274,7 @@ export class Configuration {
   }
 
   showUnderWay(c) {
+    find("configuration").setAttribute("aria-live", "off");  // it changes several times a second
     find("configuration").replaceChildren(make("p", {}, make("b", {}, c.source || c.kind), " ",
         `is under way: ${c.arrived} of ${counted(c.targeted, "unit")} there` +
         (c.round > 1 ? `, round ${c.round}` : "") + "."),
@@ -280,6 +300,8 @@ export class Configuration {
       .map(([text, count]) => `${count} ${text}`);
     const all = c.targeted > 0 && c.arrived === c.targeted;
     const element = find("configuration");
+    const unserved = make("div");
+    element.setAttribute("aria-live", "polite");
     element.replaceChildren(make("p", {}, make("b", {}, c.source || c.kind),
         ` (configuration ${c.id}) is ${c.state}.`),
     make("p", {class: all ? "good" : ""}, `${c.arrived} of ${counted(c.targeted, "unit")} arrived` +
@@ -288,8 +310,8 @@ export class Configuration {
         `${duration(c.makespan_predicted_s)}.`)] : []),
     ...this.measuredRows(c),
     ...(c.not_measured ? [make("p", {class: "trouble"}, `Not measured: ${c.not_measured}`)] : []),
-    ...this.worstRows());
-    if (parts.length > 0) await this.addUnserved(element, c.id);
+    unserved, ...this.worstRows());
+    if (parts.length > 0) await this.addUnserved(unserved, c.id);
   }
 
   worstRows() {

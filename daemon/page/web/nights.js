@@ -17,13 +17,14 @@ export function nightOf(iso) {
 }
 
 function summaryOf(rows) {
+  const done = rows.filter(({state}) => state === "done");  // others ended early
   const sum = (name) => rows.reduce((total, row) => total + row[name], 0);
   return {configurations: rows.length, targeted: sum("targeted"), arrived: sum("arrived"),
     lost: sum("refused") + sum("failed") + sum("unmeasured"),
     unitsStopped: sum("stopped"),
     stopped: rows.filter(({state}) => state === "stopped").length,
-    makespan_s: median(rows.map(({makespan_s}) => makespan_s ?? 0)),
-    behind_s: median(rows.map((row) => (row.makespan_s ?? 0) - (row.makespan_predicted_s ?? 0)))};
+    makespan_s: median(done.map(({makespan_s}) => makespan_s ?? 0)),
+    behind_s: median(done.map((row) => (row.makespan_s ?? 0) - (row.makespan_predicted_s ?? 0)))};
 }
 
 export class Nights {
@@ -61,8 +62,8 @@ export class Nights {
 
   tableOf(nights) {
     if (nights.length === 0) return make("p", {class: "hint"}, "There was no configuration yet.");
-    const heads = ["night of", "configurations", "of them stopped", "targets", "arrived", "stopped",
-      "not served", "makespan, median", "behind plan"];
+    const heads = ["night of", "configurations", "of them stopped", "targets", "arrived", "units stopped",
+      "units not served", "makespan, median", "behind plan"];
     const share = ({arrived, targeted}) => targeted === 0 ? "–"
       : `${(Math.floor(1000 * arrived / targeted) / 10).toFixed(1)} %`;
     return make("table", {class: "wide"}, make("caption", {}, "Nights, newest first"),
