@@ -14,7 +14,7 @@ function someOf(units) {
 }
 
 export class AlarmEntry {
-  constructor(alarms, {key, severity, muted, since}) {
+  constructor(alarms, {key, name, severity, muted, since}) {
     Object.assign(this, {alarms, key, entry: null, shownText: "", runbookKey: "",
       isOver: false});
     this.summary = make("summary");
@@ -25,7 +25,7 @@ export class AlarmEntry {
       if (details.open) this.fill();
     }}, this.summary, this.body);
     this.acknowledge = this.alarms.access.guard(make("button", {type: "button", class: "acknowledge",
-      onclick: () => this.alarms.change(find("alarms-summary"), "alarms_ack", {ids: this.entry.ids})},
+      "aria-label": `Acknowledge ${name}`, onclick: () => this.alarms.change(find("alarms-summary"), "alarms_ack", {ids: this.entry.ids})},
     "Acknowledge"), "alarms_ack");
     this.details = details;
     this.item = make("li", {class: `alarm ${severity}${muted && !since ? " quiet" : ""}`}, this.acknowledge,

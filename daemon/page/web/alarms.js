@@ -79,17 +79,18 @@ export class Alarms {
     this.answer = null;
     this.shownText = "";
     this.role = "";
-    this.busy = false;
+    this.isLate = false;  // something has changed since the daemon was asked
+    this.reading = null;  // until the list is as the daemon has it
     this.version = -1;
     this.isHeld = false;
     this.holdTimer = 0;
     this.sound = new Sound();
     const list = find("alarms");
-    for (const event of ["pointermove", "pointerdown", "keydown"])
+    for (const event of ["pointermove", "pointerdown", "keydown", "focusin"])
       list.addEventListener(event, () => this.hold());
     list.addEventListener("pointerleave", () => this.release());
     list.addEventListener("focusout", () => setTimeout(() => {
-      if (!list.matches(":hover")) this.release();
+      if (!list.matches(":hover, :focus-within")) this.release();
     }));
     list.addEventListener("toggle", () => this.fitHeight(), true);
     setInterval(() => {
@@ -104,15 +105,24 @@ export class Alarms {
     this.refresh();
   }
 
+  /** The list as it is now, also where an earlier question is still open. */
   async refresh() {
-    if (!this.access.may("alarms") || this.busy) return;
-    this.busy = true;
+    this.isLate = true;
+    if (!this.access.may("alarms")) return;
+    this.reading ??= this.read();
+    await this.reading;
+  }
+
+  async read() {
     try {
-      this.show(await this.api.ask("alarms"));
+      while (this.isLate) {
+        this.isLate = false;
+        this.show(await this.api.ask("alarms"));
+      }
     } catch (error) {
       setText(find("alarms-summary"), `Not known: ${error.message}.`);
     } finally {
-      this.busy = false;
+      this.reading = null;
     }
   }
 
@@ -193,7 +203,7 @@ export class Alarms {
         (units.length === 0 ? "" : `: ${units.length === 1 ? "unit" : "units"} ${named}`)), " "];
     return make("li", {class: "hint"}, `${mute.name} is muted until ${clock(mute.until)} UTC by ` +
         `${mute.by}: ${mute.reason} (${counted(mute.open, "alarm")}). `, ...since,
-    this.access.guard(make("button", {type: "button", onclick: () =>
+    this.access.guard(make("button", {type: "button", "aria-label": `Unmute ${mute.name}`, onclick: () =>
       this.change(trouble, "alarms_unmute", {name: mute.name})}, "Unmute"), "alarms_unmute"),
     trouble);
   }
@@ -202,7 +212,6 @@ export class Alarms {
   async change(trouble, verb, args) {
     try {
       await this.api.ask(verb, args);
-      this.busy = false;
       this.isHeld = false;
       await this.refresh();
       this.fitHeight();

@@ -7,6 +7,13 @@ export class ApiError extends Error {
   }
 }
 
+const kApart_ns = 512;  // times of this century are 256 ns apart in a browser's numbers
+
+/** The `until_ns` of an older page, which has nothing of that instant again though it was rounded. */
+export function justBefore(at_ns) {
+  return at_ns - kApart_ns;
+}
+
 export class Api {
   constructor() {
     this.token = "";

@@ -1,6 +1,7 @@
 // What happened, and who commanded it, newest first, page by page. A list is asked for while it is
 // open alone.
 
+import {justBefore} from "/page/api.js";
 import {clock, find, make} from "/page/dom.js";
 
 const kRowsOfPage = 20;
@@ -8,6 +9,7 @@ const kAlikeFrom = 4;     // fewer are lines of their own
 const kAlikeShown = 50;   // of a line that is unfolded
 const kEventsMax = 1000;  // that the daemon answers at once
 const kAsksMax = 10;      // for one page
+const kNearby_ns = 1024;  // more than a browser's numbers round times by
 
 /** An event of the daemon as a line. */
 export function eventLine(event) {
@@ -34,13 +36,39 @@ function runLine(run) {
   if (run.length === 1) return eventLine(run[0]);
   const rest = run.slice(1, 1 + kAlikeShown);
   const body = make("div");
+  const atLeast = run.some(({isCut}) => isCut) ? "at least " : "";
   return make("details", {class: "run", ontoggle: () => {
     if (body.childElementCount > 0) return;
     body.append(...rest.map(eventLine));
     if (run.length - 1 > rest.length)
       body.append(make("p", {class: "hint"}, `and ${run.length - 1 - rest.length} more`));
   }}, make("summary", {}, eventLine(run[0]),
-      make("span", {class: "hint"}, `and ${run.length - 1} more like it`)), body);
+      make("span", {class: "hint"}, `and ${atLeast}${run.length - 1} more like it`)), body);
+}
+
+/**
+ * Reads events, the newest first. A start of the daemon has hundreds at one instant: where an answer
+ * ends within an instant, the next one has it as a whole.
+ */
+class EventReader {
+  constructor(api) {
+    Object.assign(this, {api, through_ns: Infinity, isMore: true});
+  }
+
+  async next(limit) {
+    const {through_ns} = this;
+    const {events} = await this.api.ask("events", {limit,
+      ...(through_ns === Infinity ? {} : {until_ns: through_ns + kNearby_ns})});
+    this.isMore = events.length === limit;
+    const found = events.reverse().filter(({at_ns}) => at_ns <= through_ns);
+    if (!this.isMore) return found;
+    const oldest_ns = found.at(-1)?.at_ns ?? through_ns;
+    const whole = found.filter(({at_ns}) => at_ns > oldest_ns);
+    if (whole.length === 0 && limit < kEventsMax) return this.next(kEventsMax);
+    this.through_ns = whole.length > 0 ? oldest_ns : oldest_ns - kNearby_ns;
+    if (whole.length > 0) return whole;
+    return found.map((event) => ({...event, isCut: true}));  // more than the daemon answers at once
+  }
 }
 
 export class Events {
@@ -64,32 +92,32 @@ export class Events {
     this.onNews();
   }
 
-  /** Events before an instant; null: the newest. Those that are alike are one line. */
-  async page(before) {
+  /**
+   * Events, of which those that are alike are one line. `earlier`: a reader, and what it has read and
+   * nobody has seen; null: the newest.
+   */
+  async page(earlier) {
     const body = find("events-list");
     const asked = ++this.asked;
+    const reader = earlier?.reader ?? new EventReader(this.api);
+    const events = [...earlier?.unseen ?? []];
     try {
-      const events = [];
-      let isMore = true;
-      let until_ns = before;
-      for (let k = 0; k < kAsksMax && isMore && runsOf(events).length < kRowsOfPage; ++k) {
-        const limit = k === 0 ? 5 * kRowsOfPage : kEventsMax;
-        const answer = await this.api.ask("events", {limit, ...(until_ns === null ? {} : {until_ns})});
-        events.push(...answer.events.reverse());
-        isMore = answer.events.length === limit;
-        until_ns = events.at(-1)?.at_ns;
-      }
+      for (let k = 0; k < kAsksMax && reader.isMore && runsOf(events).length <= kRowsOfPage; ++k)
+        events.push(...await reader.next(k === 0 ? 5 * kRowsOfPage : kEventsMax));
       if (asked !== this.asked) return;
       const runs = runsOf(events);
-      const shown = runs.slice(0, kRowsOfPage);
+      const unseen = runs.slice(kRowsOfPage).flat();
       body.querySelector(".more")?.remove();
-      if (before === null) body.replaceChildren();
-      body.append(...shown.map(runLine));
-      if (events.length === 0 && before === null)
+      if (earlier === null) body.replaceChildren();
+      body.append(...runs.slice(0, kRowsOfPage).map(runLine));
+      if (events.length === 0 && earlier === null)
         body.append(make("p", {class: "hint"}, "Nothing has happened yet."));
-      if (isMore || runs.length > shown.length)
-        body.append(make("button", {type: "button", class: "more",
-          onclick: () => this.page(shown.at(-1).at(-1).at_ns)}, "Earlier"));
+      if (!reader.isMore && unseen.length === 0) return;
+      const more = make("button", {type: "button", class: "more", onclick: () => {
+        more.disabled = true;  // the reader goes on from where it is
+        this.page({reader, unseen});
+      }}, "Earlier");
+      body.append(more);
     } catch (error) {
       body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
     }
@@ -129,7 +157,7 @@ export class Commands {
         body.append(make("p", {class: "hint"}, "Nothing was commanded yet."));
       if (entries.length === kRowsOfPage)
         body.append(make("button", {type: "button", class: "more",
-          onclick: () => this.page(entries.at(-1).at_ns)}, "Earlier"));
+          onclick: () => this.page(justBefore(entries.at(-1).at_ns))}, "Earlier"));
     } catch (error) {
       body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
     }

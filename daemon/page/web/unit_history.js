@@ -2,6 +2,7 @@
 // page; its parameters, and who gave them; its alarms and changes. The latter two are asked for
 // while they are open alone.
 
+import {justBefore} from "/page/api.js";
 import {dayAndClock, make, micrometres} from "/page/dom.js";
 import {eventLine} from "/page/events.js";
 
@@ -139,6 +140,6 @@ export class UnitHistory {
     body.append(...events.map(eventLine));
     if (events.length === kEventsOfPage)
       body.append(make("button", {type: "button", class: "more",
-        onclick: () => this.fillEvents(body, events.at(-1).at_ns)}, "Earlier"));
+        onclick: () => this.fillEvents(body, justBefore(events.at(-1).at_ns))}, "Earlier"));
   }
 }
