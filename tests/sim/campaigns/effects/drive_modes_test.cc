@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "sim/campaigns/diagnosis/left_by.h"
 #include "tests/sim/campaigns/diagnosis/planted_campaign.h"
 
 namespace focalfleet::sim {
@@ -40,6 +41,17 @@ TEST(DriveModes, ATravelOfOneModeIsTheModes) {
   EXPECT_EQ(diagnosis.causes[0].cause, "mode_threshold") << Reported(diagnosis);
   EXPECT_THAT(diagnosis.causes[0].shape, testing::HasSubstr("in mode five_segment"));
   EXPECT_NEAR(diagnosis.causes[0].amplitude, 0.02, 0.002);
+}
+
+// Commands have no modes: what the moves of one mode have added up is not known where the model is
+// used, and the model leaves it out.
+TEST(DriveModes, ATermOfOneModeIsNotOfPosesAlone) {
+  const Campaign campaign = OfTwoModes(0.02);
+  const CampaignModel model = Verdicts(campaign).model;
+  ASSERT_EQ(model.terms.size(), 1u);
+  EXPECT_EQ(model.terms[0].form.memory, Memory::kChain);
+  EXPECT_FALSE(IsOfPosesAlone(model.terms[0].form));
+  for (const UnitLeft& left : LeftByCampaign(model, campaign)) EXPECT_EQ(left.added_deg[kTheta], 0);
 }
 
 TEST(DriveModes, WithoutADifferenceNothingIsNamed) {
