@@ -32,6 +32,8 @@ async function alarms(tab) {
   await textOf(tab, "#alarms > li:first-child", /unit 9 (is in fault: |reports fault )over_temperature/);
   assert.deepEqual(await placesOf(tab, kButtons), before, "an alarm came");
 
+  await runbook(tab);
+
   say("the runbook's commands have the number of the unit");
   const fault = alarmOf(tab, "UnitFault");
   await fault.locator("summary").click();
@@ -128,6 +130,97 @@ async function late(tab) {
   });
 }
 
+/** One of the alarms of an entry ends between the look and the press: the other is acknowledged. */
+async function acknowledged(tab) {
+  say("an alarm of an entry has ended when it is acknowledged");
+  const count = await tab.evaluate(async () => {
+    const {api, alarms: list} = window.focalfleetPage;
+    const before = await api.ask("alarms");
+    const ids = before.alarms.filter(({name, state}) => name === "UnitSilent" && state === "open")
+      .map(({id}) => id);
+    await api.ask("alarms_ack", {ids: ids.slice(0, 1)});
+    const {ask} = api;
+    api.ask = () => {  // the first look at the list was before that
+      api.ask = ask;
+      return Promise.resolve(before);
+    };
+    await list.acknowledge(ids);
+    return ids.length;
+  });
+  assert.ok(count > 1);
+  await textOf(tab, "#alarms-summary",
+    new RegExp(`${count - 1} alarms? acknowledged; 1 had ended meanwhile`));
+  assert.equal(await alarmOf(tab, "UnitSilent").count(), 0, "those that stood are acknowledged");
+}
+
+/** A line that was unfolded and an older page stay while something happens. */
+async function happened(tab) {
+  say("a new alarm closes no line of what happened, and takes no older page");
+  if (!await tab.locator("#events").evaluate((details) => details.open)) await tab.click("#events summary");
+  await tab.evaluate(() => {  // pages of four lines
+    const {events} = window.focalfleetPage;
+    events.begin();
+    events.runs_max = 4;
+    events.refresh();
+  });
+  await tab.waitForFunction(() => document.querySelectorAll("#events-list > :not(.more)").length === 4);
+  await tab.click("#events-list > .more");
+  await tab.waitForFunction(() => document.querySelectorAll("#events-list > :not(.more)").length > 4);
+  const run = tab.locator("#events-list details.run").first();
+  await run.waitFor();
+  await run.evaluate((details) => { details.open = true; });
+  const oldest = await tab.locator("#events-list > :not(.more)").last().innerText();
+  await world("silence 51");
+  await textOf(tab, "#events-list", /unit 51 /);
+  assert.equal(await tab.locator("#events-list details.run[open]").count(), 1, "the line is still unfolded");
+  assert.equal(await tab.locator("#events-list > :not(.more)").last().innerText(), oldest);
+  await tab.click("#events-title");
+}
+
+/** The first answer to a question, without configurations, comes after the second one's. */
+function lateAnswer(tab, list) {
+  return tab.evaluate(async (name) => {
+    const {api, [name]: shown} = window.focalfleetPage;
+    const look = () => name === "nights" ? shown.show() : shown.page(null);
+    const {ask} = api;
+    let answer = null;
+    api.ask = () => {
+      api.ask = ask;
+      return new Promise((resolve) => { answer = resolve; });
+    };
+    const first = look();
+    await look();
+    answer({configurations: []});
+    await first;
+  }, list);
+}
+
+async function answers(tab) {
+  say("a late answer replaces no newer one");
+  await tab.click("#show-nights");
+  await textOf(tab, "#nights-table", /night of/);
+  await lateAnswer(tab, "nights");
+  assert.match(await tab.locator("#nights-table").innerText(), /night of/);
+  await tab.click("#show-plate");
+  await tab.click("#earlier summary");
+  await textOf(tab, "#earlier-list", "night-1.csv");
+  await lateAnswer(tab, "earlier");
+  assert.match(await tab.locator("#earlier-list").innerText(), /night-1.csv/);
+  await tab.click("#earlier-title");
+}
+
+async function runbook(tab) {
+  say("a runbook that did not come is asked for again");
+  await tab.route("**/page/runbook.md", (route) => route.fulfill({status: 503, body: "busy"}), {times: 1});
+  const fault = alarmOf(tab, "UnitFault");
+  await fault.locator("summary").click();
+  await textOf(tab, "#alarms", "The runbook did not come");
+  await fault.locator("summary").click();
+  await fault.locator("summary").click();
+  await fault.locator(".runbook li").first().waitFor();
+  await fault.locator("summary").click();
+}
+
 async function pages(tab) {
   say("an older page of a list has nothing of the newer one");
   const ns = [1795917759008221125n, 1795917759008221183n, 1795917759008221313n, 1795917759008221440n];
@@ -190,6 +283,9 @@ export async function calm(browser) {
   await alarms(tab);
   await mutes(tab);
   await late(tab);
+  await acknowledged(tab);
+  await happened(tab);
+  await answers(tab);
   await pages(tab);
 
   say("header and legend count the same");
@@ -201,7 +297,7 @@ export async function calm(browser) {
   say("more units than a list has room for are counted");
   await world("targets 7");
   await dropFile(tab, "night-2.csv", targets());
-  await textOf(tab, "#preview", /16 targets not served[\s\S]*and 8 more units/);
+  await textOf(tab, "#preview", /17 targets not served[\s\S]*and 9 more units/);
   await tab.screenshot({path: `${given.out}/preview-unserved.png`});
   assert.deepEqual(await axeFindings(tab), []);
 

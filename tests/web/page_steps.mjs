@@ -104,7 +104,8 @@ async function night(browser) {
   await dropFile(tab, "night-2.csv", targets());
   await armStop(tab);
   await tab.click("#apply");
-  await textOf(tab, "#configuration", /night-2.csv .*is stopped/);
+  await textOf(tab, "#configuration",
+    /night-2.csv .*is stopped\. Stopped by token operator-page, \d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC\./);
   await tab.screenshot({path: `${given.out}/stopped.png`});
 
   say("where the errors are");
@@ -133,6 +134,14 @@ async function night(browser) {
   say("what happened, newest first");
   await tab.click("#events summary");
   await textOf(tab, "#events-list", /UTC .*night-2.csv.*is stopped/);
+
+  say("who commanded what: units, files and configurations are named");
+  await world("disable 5");
+  await tab.click("#commands summary");
+  await textOf(tab, "#commands-list", /disable \(unit 5\) by uid \d+ /);
+  await textOf(tab, "#commands-list", /apply \(night-2.csv, configuration 2\) by token operator-page/);
+  await textOf(tab, "#commands-list", /stop \(configuration 2\) by token operator-page/);
+  await tab.click("#commands-title");
 
   say("an alarm: the runbook's words, mute with a reason, acknowledge");
   await tab.click("#sound");

@@ -139,7 +139,7 @@ export async function past(browser) {
 
   say("who stopped, and by which door");
   await tab.click("#commands summary");
-  await textOf(tab, "#commands-list", /stop by token operator-page \(operator, http\)/);
+  await textOf(tab, "#commands-list", /stop (\(configuration \d+\) )?by token operator-page \(operator, http\)/);
   const times = await tab.locator("#commands-list .event .hint").allInnerTexts();
   assert.ok(times.every((time) => time.trim().endsWith(" UTC")), times.join());
   assert.deepEqual(times, times.toSorted().reverse(), "the newest command first");

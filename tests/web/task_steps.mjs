@@ -154,7 +154,7 @@ export async function tasks(browser) {
   await untilAllStand(tab);
   await task(hand, "Find who stopped", async () => {
     await hand.click("#commands summary");
-    await hand.answer("#commands-list", /stop by token operator-page/);
+    await hand.answer("#commands-list", /stop (\(configuration \d+\) )?by token operator-page/);
   });
   await task(hand, "How did the last configuration go, unit by unit?", async () => {
     await hand.click("#earlier summary");

@@ -1,7 +1,7 @@
 // One entry of the list of alarms: its text, and unfolded what can be done about it, with the
 // runbook's words. The entry stays the same element while its alarms change.
 
-import {clock, find, make, setText} from "/page/dom.js";
+import {clock, make, setText} from "/page/dom.js";
 import {dawn, keepDawn, secondsUntil, timeOfDay} from "/page/mute_time.js";
 import {runbookOf} from "/page/runbook.js";
 
@@ -25,7 +25,8 @@ export class AlarmEntry {
       if (details.open) this.fill();
     }}, this.summary, this.body);
     this.acknowledge = this.alarms.access.guard(make("button", {type: "button", class: "acknowledge",
-      "aria-label": `Acknowledge ${name}`, onclick: () => this.alarms.change(find("alarms-summary"), "alarms_ack", {ids: this.entry.ids})},
+      "aria-label": `Acknowledge ${name}`, onclick: () =>
+        this.alarms.acknowledge(this.entry.ids)},
     "Acknowledge"), "alarms_ack");
     this.details = details;
     this.item = make("li", {class: `alarm ${severity}${muted && !since ? " quiet" : ""}`}, this.acknowledge,
@@ -56,8 +57,7 @@ export class AlarmEntry {
   }
 
   fill() {
-    if (this.body.childElementCount > 0) return;
-    this.body.append(this.actions(), this.units, this.runbook);
+    if (this.body.childElementCount === 0) this.body.append(this.actions(), this.units, this.runbook);
     this.showUnits();
   }
 
@@ -74,8 +74,13 @@ export class AlarmEntry {
     if (key === this.runbookKey) return;
     this.runbookKey = key;
     const words = await runbookOf(name, newest);
-    if (key === this.runbookKey)
+    if (key !== this.runbookKey) return;
+    if (!words) {
+      this.runbookKey = "";
+      this.runbook.replaceChildren(make("p", {class: "hint"}, "The runbook did not come: unfold the alarm again."));
+    } else {
       this.runbook.replaceChildren(...(about ? [make("p", {class: "hint"}, about)] : []), ...words);
+    }
   }
 
   // ---- mute

@@ -3,12 +3,15 @@
 // those that are over stay until the pointer has left.
 
 import {AlarmEntry} from "/page/alarm_entry.js";
-import {clock, counted, find, make, setText} from "/page/dom.js";
+import {arrange, clock, counted, find, make, setText} from "/page/dom.js";
 
 const kPeriod_ms = 10_000;  // others acknowledge, too
 const kHold_ms = 10_000;    // after the last move of the pointer
 const kRanks = {error: 0, warning: 1, info: 2};
 const kUnitsOfMute = 6;
+const kAsksMax = 3;   // of one acknowledgement
+const kInvalid = 400;
+const kOutcome_ms = 60_000;
 
 /** Whether the alarm began while its kind was muted already. */
 function isSince(alarm, mutes) {
@@ -84,6 +87,8 @@ export class Alarms {
     this.version = -1;
     this.isHeld = false;
     this.holdTimer = 0;
+    this.outcome = "";  // of the last acknowledgement, where there is something to say
+    this.outcomeAt_ms = 0;
     this.sound = new Sound();
     const list = find("alarms");
     for (const event of ["pointermove", "pointerdown", "keydown", "focusin"])
@@ -131,7 +136,8 @@ export class Alarms {
     const muted = answer.muted === 0 ? "" : `, ${answer.muted} muted` +
         (since > 0 ? ` (${since} since)` : "");
     setText(find("alarms-summary"),
-        answer.open === 0 && !muted ? "None is open." : `${answer.open} open${muted}.`);
+        (answer.open === 0 && !muted ? "None is open." : `${answer.open} open${muted}.`) +
+        (Date.now() - this.outcomeAt_ms < kOutcome_ms ? this.outcome : ""));
     find("alarms-summary").classList.toggle("since", since > 0);
     this.sound.note(answer.alarms.filter(({state, muted: isMuted}) => state === "open" && !isMuted)
       .map(({id}) => id));
@@ -160,7 +166,6 @@ export class Alarms {
   }
 
   render() {
-    const list = find("alarms");
     const folded = fold(this.answer);
     const keys = new Set(folded.map(({key}) => key));
     if (this.role !== this.access.role) this.entries.clear();  // other buttons
@@ -175,16 +180,7 @@ export class Alarms {
       shown.update(entry);
       this.entries.set(entry.key, shown);
     }
-    let at = list.firstElementChild;  // an element that stays in its place keeps the focus
-    for (const {item} of this.entries.values()) {
-      if (item === at) at = at.nextElementSibling;
-      else list.insertBefore(item, at);
-    }
-    while (at) {
-      const gone = at;
-      at = at.nextElementSibling;
-      gone.remove();
-    }
+    arrange(find("alarms"), [...this.entries.values()].map(({item}) => item));
     find("mutes").replaceChildren(...this.answer.mutes.map((mute) => this.muteOf(mute)));
   }
 
@@ -206,6 +202,37 @@ export class Alarms {
     this.access.guard(make("button", {type: "button", "aria-label": `Unmute ${mute.name}`, onclick: () =>
       this.change(trouble, "alarms_unmute", {name: mute.name})}, "Unmute"), "alarms_unmute"),
     trouble);
+  }
+
+  /**
+   * Acknowledges those of an entry's alarms that are open by now: the daemon refuses all where one of
+   * them has ended, which one may do until it has the question.
+   */
+  async acknowledge(ids) {
+    const say = (text) => Object.assign(this, {outcome: text, outcomeAt_ms: Date.now()});
+    say("");
+    try {
+      for (let k = 1; ; ++k) {
+        const open = new Set((await this.api.ask("alarms")).alarms
+          .filter(({state}) => state === "open").map(({id}) => id));
+        const standing = ids.filter((id) => open.has(id));
+        const ended = ids.length - standing.length;
+        try {
+          if (standing.length > 0) await this.api.ask("alarms_ack", {ids: standing});
+        } catch (error) {
+          if (error.status !== kInvalid || k === kAsksMax) throw error;
+          continue;
+        }
+        if (ended > 0)
+          say(` ${counted(standing.length, "alarm")} acknowledged; ${ended} had ended meanwhile.`);
+        break;
+      }
+    } catch (error) {
+      say(` Not acknowledged: ${error.message}.`);
+    }
+    this.isHeld = false;
+    await this.refresh();
+    this.fitHeight();
   }
 
   /** A change by the operator, who then sees the list as it is. */

@@ -1,6 +1,7 @@
 // A configuration from file to result: preview, apply, progress, and what came of it.
 
 import {stateOf} from "/page/colours.js";
+import {stopperOf} from "/page/commands.js";
 import {counted, duration, find, make, micrometres, set, setText} from "/page/dom.js";
 import {filmOfPreview} from "/page/film.js";
 import {motionsIn} from "/page/motion.js";
@@ -311,7 +312,17 @@ export class Configuration {
     ...this.measuredRows(c),
     ...(c.not_measured ? [make("p", {class: "trouble"}, `Not measured: ${c.not_measured}`)] : []),
     unserved, ...this.worstRows());
+    if (c.state === "stopped") this.addStopper(element.firstElementChild, c.id);
     if (parts.length > 0) await this.addUnserved(unserved, c.id);
+  }
+
+  async addStopper(line, id) {
+    try {
+      const text = await stopperOf(this.api, this.access, id);
+      if (text) line.append(` ${text}`);
+    } catch {
+      // The list of commands says why the audit cannot be read.
+    }
   }
 
   worstRows() {

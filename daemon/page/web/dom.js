@@ -14,6 +14,20 @@ export function make(tag, attributes = {}, ...children) {
   return element;
 }
 
+/** These are the children now. One that stays in its place keeps the focus. */
+export function arrange(parent, elements) {
+  let at = parent.firstElementChild;
+  for (const element of elements) {
+    if (element === at) at = at.nextElementSibling;
+    else parent.insertBefore(element, at);
+  }
+  while (at) {
+    const gone = at;
+    at = at.nextElementSibling;
+    gone.remove();
+  }
+}
+
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }

@@ -104,7 +104,8 @@ export class Earlier {
   constructor(api, access, plate, player) {
     Object.assign(this, {api, access, plate, player});
     this.key = "";
-    this.asked = 0;
+    this.asked = 0;      // for replays
+    this.askedList = 0;
     find("earlier").addEventListener("toggle", () => {
       if (find("earlier").open) this.page(null);
     });
@@ -121,9 +122,11 @@ export class Earlier {
   /** Configurations whose last change was before an instant; null: the newest. */
   async page(before) {
     const body = find("earlier-list");
+    const asked = ++this.askedList;
     try {
       const {configurations} = await this.api.ask("history",
           {limit: kRowsOfPage, ...(before === null ? {} : {until_ns: before})});
+      if (asked !== this.askedList) return;  // a later question has a newer answer
       body.querySelector(".more")?.remove();
       if (before === null) body.replaceChildren();
       body.append(...configurations.map((row) => this.rowOf(row)));
@@ -133,7 +136,7 @@ export class Earlier {
         body.append(make("button", {type: "button", class: "more", onclick: () =>
           this.page(Date.parse(configurations.at(-1).changed) * 1_000_000)}, "Earlier ones"));
     } catch (error) {
-      body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
+      if (asked === this.askedList) body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
     }
   }
 

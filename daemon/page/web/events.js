@@ -1,14 +1,13 @@
-// What happened, and who commanded it, newest first, page by page. A list is asked for while it is
-// open alone.
+// What happened, newest first, page by page. The list is asked for while it is open alone.
 
-import {justBefore} from "/page/api.js";
-import {clock, find, make} from "/page/dom.js";
+import {arrange, clock, find, make} from "/page/dom.js";
 
 const kRowsOfPage = 20;
 const kAlikeFrom = 4;     // fewer are lines of their own
 const kAlikeShown = 50;   // of a line that is unfolded
 const kEventsMax = 1000;  // that the daemon answers at once
 const kAsksMax = 10;      // for one page
+const kRunsBesides = 100;  // newer lines that push no older one out
 const kNearby_ns = 1024;  // more than a browser's numbers round times by
 
 /** An event of the daemon as a line. */
@@ -71,15 +70,30 @@ class EventReader {
   }
 }
 
+const keyOf = ({at_ns, kind, name, text}) => `${at_ns} ${kind} ${name} ${text}`;
+
+/**
+ * The list keeps what somebody unfolded or paged to while newer events come on top. One question is
+ * asked at a time.
+ */
 export class Events {
   /** `onNews()` is called when something has changed. */
   constructor(api, onNews) {
     Object.assign(this, {api, onNews});
     this.key = "";
-    this.asked = 0;
+    this.turn = Promise.resolve();  // the questions so far
+    this.isDue = false;             // the newest are going to be asked for
+    this.begin();
     find("events").addEventListener("toggle", () => {
-      if (find("events").open) this.page(null);
+      if (find("events").open) this.refresh();
     });
+  }
+
+  begin() {
+    this.read = [];  // events of the list, the newest first
+    this.runs_max = kRowsOfPage;
+    this.reader = new EventReader(this.api);
+    this.lines = new Map();  // by the oldest event of each
   }
 
   /** Something has changed that may have become an event. */
@@ -88,78 +102,78 @@ export class Events {
     const key = `${facts.alarms} ${c.id} ${c.state} ${facts.busy}`;
     if (key === this.key) return;
     this.key = key;
-    if (find("events").open) this.page(null);
+    if (find("events").open) this.refresh();
     this.onNews();
   }
 
-  /**
-   * Events, of which those that are alike are one line. `earlier`: a reader, and what it has read and
-   * nobody has seen; null: the newest.
-   */
-  async page(earlier) {
-    const body = find("events-list");
-    const asked = ++this.asked;
-    const reader = earlier?.reader ?? new EventReader(this.api);
-    const events = [...earlier?.unseen ?? []];
-    try {
-      for (let k = 0; k < kAsksMax && reader.isMore && runsOf(events).length <= kRowsOfPage; ++k)
-        events.push(...await reader.next(k === 0 ? 5 * kRowsOfPage : kEventsMax));
-      if (asked !== this.asked) return;
-      const runs = runsOf(events);
-      const unseen = runs.slice(kRowsOfPage).flat();
-      body.querySelector(".more")?.remove();
-      if (earlier === null) body.replaceChildren();
-      body.append(...runs.slice(0, kRowsOfPage).map(runLine));
-      if (events.length === 0 && earlier === null)
-        body.append(make("p", {class: "hint"}, "Nothing has happened yet."));
-      if (!reader.isMore && unseen.length === 0) return;
-      const more = make("button", {type: "button", class: "more", onclick: () => {
-        more.disabled = true;  // the reader goes on from where it is
-        this.page({reader, unseen});
-      }}, "Earlier");
-      body.append(more);
-    } catch (error) {
-      body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
-    }
-  }
-}
-
-/** Commands and refusals by the daemon's audit, which takes the role operator. */
-export class Commands {
-  constructor(api, access) {
-    Object.assign(this, {api, access});
-    find("commands").addEventListener("toggle", () => {
-      if (find("commands").open) this.page(null);
+  refresh() {
+    if (this.isDue) return;
+    this.isDue = true;
+    this.next(() => {
+      this.isDue = false;
+      return this.read.length === 0 ? this.readOlder() : this.readNewer();
     });
   }
 
-  /** Something has changed that may follow a command. */
-  note() {
-    if (find("commands").open) this.page(null);
+  next(act) {
+    this.turn = this.turn.then(act).then(() => this.show()).catch((error) =>
+      find("events-list").replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`)));
   }
 
-  async page(before) {
-    const body = find("commands-list");
-    if (!this.access.may("audit"))
-      return body.replaceChildren(make("p", {class: "hint"},
-          `This takes the role operator; you are ${this.access.role}.`));
-    try {
-      const {entries} = await this.api.ask("audit",
-          {limit: kRowsOfPage, ...(before === null ? {} : {until_ns: before})});
-      entries.reverse();  // the newest first, as all lists have it
-      body.querySelector(".more")?.remove();
-      if (before === null) body.replaceChildren();
-      body.append(...entries.map((entry) => make("p", {class: `event ${entry.taken ? "" : "warning"}`},
-          make("span", {class: "hint"}, `${clock(entry.at)} UTC `), make("b", {}, entry.verb), " by ",
-          `${entry.name || "somebody"} (${entry.role}, ${entry.door})`,
-          entry.taken ? "" : `: refused, ${entry.reason}`)));
-      if (entries.length === 0 && before === null)
-        body.append(make("p", {class: "hint"}, "Nothing was commanded yet."));
-      if (entries.length === kRowsOfPage)
-        body.append(make("button", {type: "button", class: "more",
-          onclick: () => this.page(justBefore(entries.at(-1).at_ns))}, "Earlier"));
-    } catch (error) {
-      body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
+  async readOlder() {
+    const known = new Set(this.read.map(keyOf));
+    for (let k = 0; k < kAsksMax && this.reader.isMore && runsOf(this.read).length <= this.runs_max; ++k) {
+      const older = await this.reader.next(k === 0 ? 5 * kRowsOfPage : kEventsMax);
+      this.read.push(...older.filter((event) => !known.has(keyOf(event))));
     }
+    this.trim(this.runs_max);
+  }
+
+  /** Where too much has happened since, the list begins anew. */
+  async readNewer() {
+    const known = new Set(this.read.map(keyOf));
+    const reader = new EventReader(this.api);
+    const newer = [];
+    const isKnown = () => newer.some((event) => known.has(keyOf(event)));
+    for (let k = 0; k < kAsksMax && reader.isMore && !isKnown(); ++k)
+      newer.push(...await reader.next(k === 0 ? 5 * kRowsOfPage : kEventsMax));
+    if (!isKnown()) {
+      this.begin();
+      return this.readOlder();
+    }
+    const oldest_ns = this.read.at(-1).at_ns;
+    const fresh = newer.filter((event) => event.at_ns >= oldest_ns && !known.has(keyOf(event)));
+    this.read = [...fresh, ...this.read].sort((a, b) => b.at_ns - a.at_ns);
+    this.trim(this.runs_max + kRunsBesides);
+  }
+
+  /** Lines beyond a number go, and can be asked for again. */
+  trim(runs_max) {
+    const runs = runsOf(this.read);
+    if (runs.length <= runs_max) return;
+    this.reader.through_ns = runs[runs_max][0].at_ns;
+    this.reader.isMore = true;
+    this.read = runs.slice(0, runs_max).flat();
+  }
+
+  show() {
+    const before = this.lines;
+    this.lines = new Map();
+    for (const run of runsOf(this.read)) {
+      const key = keyOf(run.at(-1));
+      const known = before.get(key);
+      const isSame = known?.length === run.length;
+      const element = isSame ? known.element : runLine(run);
+      if (!isSame && known?.element.open) element.open = true;
+      this.lines.set(key, {element, length: run.length});
+    }
+    const more = make("button", {type: "button", class: "more", onclick: () => {
+      more.disabled = true;
+      this.runs_max = this.lines.size + kRowsOfPage;
+      this.next(() => this.readOlder());
+    }}, "Earlier");
+    arrange(find("events-list"), [...[...this.lines.values()].map(({element}) => element),
+      ...(this.read.length === 0 ? [make("p", {class: "hint"}, "Nothing has happened yet.")] : []),
+      ...(this.reader.isMore ? [more] : [])]);
   }
 }

@@ -32,6 +32,7 @@ export class Nights {
   constructor(api, isShown) {
     Object.assign(this, {api, isShown});
     this.key = "";
+    this.asked = 0;
   }
 
   /** The newest state of the fleet: a configuration may have begun, or ended. */
@@ -44,8 +45,10 @@ export class Nights {
 
   async show() {
     const body = find("nights-table");
+    const asked = ++this.asked;
     try {
       const {configurations} = await this.api.ask("history", {limit: kConfigurations});
+      if (asked !== this.asked) return;  // a later question has a newer answer
       const nights = new Map();
       for (const row of configurations) {
         const night = nightOf(row.began);
@@ -56,7 +59,7 @@ export class Nights {
           configurations.length === kConfigurations
             ? `The newest ${kConfigurations} configurations alone: the last night may be cut.` : ""));
     } catch (error) {
-      body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
+      if (asked === this.asked) body.replaceChildren(make("p", {class: "hint"}, `Not known: ${error.message}.`));
     }
   }
 

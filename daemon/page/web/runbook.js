@@ -6,7 +6,9 @@ let sections = null;
 
 /** The sections of the runbook by their headings. */
 async function load() {
-  const text = await (await fetch("/page/runbook.md")).text();
+  const answer = await fetch("/page/runbook.md");
+  if (!answer.ok) throw new Error(`the daemon answered ${answer.status}`);
+  const text = await answer.text();
   const found = new Map();
   for (const part of text.split(/^### /m).slice(1)) {
     const [name, ...lines] = part.split("\n");
@@ -22,14 +24,18 @@ function proseOf(text, unit) {
   return plain.split("`").map((part, k) => k % 2 === 1 ? make("code", {}, codeOf(part)) : part);
 }
 
-/** What the runbook has about the alarm, as elements; commands name the unit, if there is one. */
+/**
+ * What the runbook has about the alarm, as elements; commands name the unit, if there is one.
+ * null: the daemon did not give it.
+ */
 export async function runbookOf(name, unit) {
-  sections ??= load();
+  const asked = sections ??= load();
   let text;
   try {
-    text = (await sections).get(name);
+    text = (await asked).get(name);
   } catch {
-    sections = null;
+    if (sections === asked) sections = null;  // the next alarm that is unfolded asks again
+    return null;
   }
   if (!text) return [make("p", {class: "hint"}, "The runbook has no entry for it.")];
   const [prose, ...items] = text.split(/^- /m);
