@@ -39,9 +39,13 @@ struct Track {
 
 struct Effect;
 
+/// The laws by which causes act: mechanisms that are integrated, or curves (curves.h).
+enum class Physics : std::uint8_t { kMechanisms, kCurves };
+
 /// The data that an effect may read: commands and conditions, never the other units' true state.
 struct Scene {
   const Campaign* campaign = nullptr;
+  Physics physics = Physics::kMechanisms;
   std::vector<std::vector<std::size_t>> neighbours;
 };
 

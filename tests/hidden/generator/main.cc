@@ -18,7 +18,7 @@ constexpr const char* kHelp =
     "  plants campaign I of suite S. --campaign writes moves.csv and units.csv, --key writes\n"
     "  key.json and contribution.csv. To fix what else is drawn: --kind null|single|composite|\n"
     "  unknown, --cause ID, --lambda L, --design survey|diagnostic|arcs, --class clean|dirty,\n"
-    "  --units N, --moves M.\n"
+    "  --units N, --moves M. --physics mechanisms|curves: the laws by which causes act.\n"
     "hidden_generate --causes   lists what can be planted\n";
 
 Status MakeFolder(const std::string& path) {
@@ -37,6 +37,10 @@ Status Run(std::map<std::string, std::string> arguments) {
   wishes.lambda = std::atof(arguments["lambda"].c_str());
   wishes.units = std::strtoull(arguments["units"].c_str(), nullptr, 10);
   wishes.moves = std::strtoull(arguments["moves"].c_str(), nullptr, 10);
+  const std::string physics = arguments["physics"];
+  if (!physics.empty() && physics != "mechanisms" && physics != "curves")
+    return Fail(ErrorCode::kInvalid, "--physics is mechanisms or curves");
+  wishes.physics = physics == "curves" ? Physics::kCurves : Physics::kMechanisms;
   if (!arguments["units"].empty() && (wishes.units < 2 || wishes.units > 5000))
     return Fail(ErrorCode::kInvalid, "--units is 2 to 5000");
   if (!arguments["moves"].empty() && (wishes.moves < 10 || wishes.moves > 2000))
@@ -62,7 +66,7 @@ Status Run(std::map<std::string, std::string> arguments) {
 
 int Main(int argc, char** argv) {
   static const std::string kKnown =
-      " seed index campaign key kind cause lambda design class units moves ";
+      " seed index campaign key kind cause lambda design class units moves physics ";
   std::map<std::string, std::string> arguments;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "protocol/base/rng.h"
+#include "tests/hidden/generator/curves.h"
 #include "tests/hidden/generator/layout.h"
 
 namespace focalfleet::hidden {
@@ -15,6 +16,29 @@ std::size_t PartnerOf(const Effect& swap, std::size_t unit) {
   for (std::size_t o = 0; o < swap.weight.size(); ++o)
     if (o != unit && swap.weight[o] == swap.weight[unit]) return o;
   return unit;
+}
+
+// The place errors of an axis that comes to rest anew: larger after long moves, and not alike in
+// all units. Bearings tilt with either axis, so that the fibre is off in any direction.
+void AddScatterOfBearings(const Campaign& campaign, const Truth& truth, std::size_t unit,
+                          Track* track) {
+  const Geometry& arms = truth.geometry[unit];
+  Rng rng = Rng::Stream(truth.seed, "bearings", unit);
+  const double of_unit = std::exp(0.3 * rng.Normal());
+  Place held_mm;
+  for (std::size_t m = 0; m < campaign.move_count(); ++m) {
+    const Row& row = campaign.At(m, unit);
+    double square_mm2 = 0;
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      if (!row.Moved(a) && !row.rehomed) continue;
+      const double travel_deg = std::abs(row.cmd_deg[a] - row.from_deg[a]);
+      const double sigma_mm = truth.actuation_sigma_deg[a] * kDegree * arms.arm_mm[a];
+      square_mm2 += sigma_mm * sigma_mm * (0.5 + 0.5 * std::min(2.0, travel_deg / 60));
+    }
+    if (square_mm2 > 0)
+      held_mm = of_unit * std::sqrt(square_mm2 / 2) * Place(rng.Normal(), rng.Normal());
+    track->place_mm[m] += held_mm;
+  }
 }
 
 void AddScatter(const Campaign& campaign, const Truth& truth, std::size_t unit, Track* track) {
@@ -52,6 +76,12 @@ void PlaceFibre(const Geometry& geometry, Track* track) {
   }
 }
 
+ApplyEffect LawOf(const Scene& scene, const Effect& effect) {
+  const ApplyEffect curve =
+      scene.physics == Physics::kCurves ? CurveOf(effect.kind->cause) : nullptr;
+  return curve != nullptr ? curve : effect.kind->apply;
+}
+
 std::vector<Place> RunUnit(const Scene& scene, const Truth& truth, std::span<const Effect> effects,
                            std::size_t unit) {
   const Campaign& campaign = *scene.campaign;
@@ -67,13 +97,15 @@ std::vector<Place> RunUnit(const Scene& scene, const Truth& truth, std::span<con
   const auto apply = [&](Stage stage) {
     for (const Effect& effect : effects)
       if (effect.kind->stage == stage && effect.size != 0 && effect.weight[unit] != 0)
-        effect.kind->apply(scene, effect, unit, &track);
+        LawOf(scene, effect)(scene, effect, unit, &track);
   };
   for (const Stage stage :
        {Stage::kTravel, Stage::kRest, Stage::kHistory, Stage::kGear, Stage::kExposure})
     apply(stage);
-  AddScatter(campaign, truth, unit, &track);
+  const bool is_of_bearings = scene.physics == Physics::kCurves && truth.seed % 2 == 0;
+  if (!is_of_bearings) AddScatter(campaign, truth, unit, &track);
   PlaceFibre(truth.geometry[unit], &track);
+  if (is_of_bearings) AddScatterOfBearings(campaign, truth, unit, &track);
   apply(Stage::kPlate);
   apply(Stage::kCamera);
   return std::move(track.place_mm);
@@ -87,7 +119,9 @@ Truth Believed(const Campaign& campaign) {
   return truth;
 }
 
-Scene MakeScene(const Campaign& campaign) { return {&campaign, Neighbours(campaign)}; }
+Scene MakeScene(const Campaign& campaign, Physics physics) {
+  return {&campaign, physics, Neighbours(campaign)};
+}
 
 std::vector<std::size_t> AllUnits(const Campaign& campaign) {
   std::vector<std::size_t> units(campaign.unit_count());

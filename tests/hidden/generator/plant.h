@@ -19,7 +19,7 @@ struct Truth {
 /// The geometry of units.csv and no scatter.
 Truth Believed(const Campaign& campaign);
 
-Scene MakeScene(const Campaign& campaign);
+Scene MakeScene(const Campaign& campaign, Physics physics = Physics::kMechanisms);
 
 /// The true places. Shape: (moves), for each of `units`. Cost: O(moves * effects) a unit, some 0.1
 /// to 100 us a move.

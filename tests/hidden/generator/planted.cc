@@ -158,7 +158,7 @@ Planted Plant(const Spec& spec) {
   planted.spec = spec;
   planted.campaign = MakeCampaign(spec.design, spec.seed);
   planted.truth = DrawTruth(spec, planted.campaign);
-  const Scene scene = MakeScene(planted.campaign);
+  const Scene scene = MakeScene(planted.campaign, planted.spec.physics);
   const NoiseModel noise = ExpectedNoise(spec, planted.campaign, planted.truth);
   const auto seen = Exposed(planted.campaign);
   Rng rng = Rng::Stream(spec.seed, "effects");
@@ -184,7 +184,7 @@ Planted Plant(const Spec& spec) {
 }
 
 Key MakeKey(const Planted& planted) {
-  const Scene scene = MakeScene(planted.campaign);
+  const Scene scene = MakeScene(planted.campaign, planted.spec.physics);
   const Spec& spec = planted.spec;
   Json out;
   out["campaign_seed"] = spec.seed;

@@ -186,6 +186,7 @@ Result<Spec> DrawSpec(std::uint64_t suite_seed, std::uint64_t index, const Wishe
   Rng rng = Rng::Stream(suite_seed, "spec", index);
   Spec spec;
   spec.seed = Rng::Stream(suite_seed, "campaign", index).Bits();
+  spec.physics = wishes.physics;
   spec.kind = wishes.kind.empty() ? slot.kind : wishes.kind;
   for (const auto& [wish, allowed] :
        {std::pair{spec.kind, std::string(" null single composite unknown ")},

@@ -41,7 +41,8 @@ struct StaticErrors {
 
 struct Spec {
   std::uint64_t seed = 0;  // of this campaign
-  std::string kind;        // null, single, composite, unknown
+  Physics physics = Physics::kMechanisms;
+  std::string kind;  // null, single, composite, unknown
   bool dirty = false;
   DesignOptions design;
   double centroid_um = 2;
@@ -57,6 +58,7 @@ struct Spec {
 
 /// Choices that a caller may fix; empty and zero: drawn.
 struct Wishes {
+  Physics physics = Physics::kMechanisms;
   std::string kind;
   std::string cause;
   std::string design;
