@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "sim/campaigns/diagnosis/geometry_check.h"
-#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/planting/planted.h"
 #include "sim/campaigns/effects/empirical.h"
 #include "sim/campaigns/effects/registry.h"
 

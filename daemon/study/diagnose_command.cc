@@ -24,7 +24,7 @@
 #include "daemon/tables/read_table.h"
 #include "protocol/base/rng.h"
 #include "sim/campaigns/diagnosis/plain_geometry.h"
-#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/planting/planted.h"
 #include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet::cli {

@@ -1,5 +1,5 @@
-// Two rules of direction: includes follow the table of layers, and pure folders touch nothing
-// outside.
+// Three rules of direction: includes follow the table of layers, pure folders touch nothing
+// outside, and the diagnosis knows no cause by its name.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -101,6 +101,44 @@ Complaints IncludeDirection(const Files& files) {
   return out;
 }
 
+// The names of all causes: each effect has its own in its file, other_causes.h has the rest.
+std::vector<std::string> CauseNames(const Files& files) {
+  std::vector<std::string> names;
+  const auto add_quoted = [&](const std::string& line, std::string_view before) {
+    for (std::size_t at = line.find(before); at != std::string::npos;
+         at = line.find(before, at + 1)) {
+      const std::size_t begin = at + before.size();
+      names.push_back(line.substr(begin, line.find('"', begin) - begin));
+      // Empirical terms are no causes: they have no name to give.
+      if (StartsWith(names.back(), "empirical_")) names.pop_back();
+    }
+  };
+  for (const File& file : files) {
+    if (!StartsWith(file.path, "sim/campaigns/effects/")) continue;
+    for (const std::string& line : Lines(file.text)) {
+      add_quoted(line, ".cause = \"");
+      if (EndsWith(file.path, "other_causes.h")) add_quoted(line, "= \"");
+    }
+  }
+  return names;
+}
+
+// A diagnosis that treats a cause by its name has a rule for one cause, and rules for one cause
+// were tuned on one generator. Causes have traits (effects/traits.h).
+Complaints DiagnosisKnowsNoName(const Files& files) {
+  const std::vector<std::string> names = CauseNames(files);
+  Complaints out;
+  for (const File& file : files) {
+    if (!StartsWith(file.path, "sim/campaigns/diagnosis/")) continue;
+    const auto lines = Lines(file.text);
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      for (const std::string& name : names)
+        if (lines[i].find('"' + name + '"') != std::string::npos)
+          out.push_back(At(file, i, "a cause by its name: " + name));
+  }
+  return out;
+}
+
 // A variable at namespace scope stands at the left edge, and neither constant nor a function nor a
 // type.
 bool LooksLikeMutableGlobal(const std::string& line) {
@@ -138,6 +176,10 @@ Complaints PureFoldersArePure(const Files& files) {
 
 TEST(Tidy, IncludesFollowTheDependencyDirection) { ExpectNone(IncludeDirection(Tree())); }
 TEST(Tidy, PureFoldersArePure) { ExpectNone(PureFoldersArePure(Tree())); }
+TEST(Tidy, TheDiagnosisKnowsNoCauseByItsName) {
+  EXPECT_GE(CauseNames(Tree()).size(), 40u);
+  ExpectNone(DiagnosisKnowsNoName(Tree()));
+}
 
 TEST(TidyRules, DirectionIsCaughtBothWays) {
   const auto include = [](const char* from, const std::string& what) {
@@ -189,6 +231,16 @@ TEST(TidyRules, MutableGlobalsAreCaught) {
   EXPECT_EQ(found("using Pose = int;"), 0u);
   EXPECT_EQ(found("int Count(int x);"), 0u);
   EXPECT_EQ(found("  int local = 0;"), 0u);
+}
+
+TEST(TidyRules, ACauseByItsNameIsCaught) {
+  const File effect{"sim/campaigns/effects/wear.cc", "return {.cause = \"wear\",\n"};
+  const auto found = [&](const std::string& path, const std::string& text) {
+    return DiagnosisKnowsNoName({effect, {path, text}}).size();
+  };
+  EXPECT_EQ(found("sim/campaigns/diagnosis/a.cc", "if (cause == \"wear\") return;\n"), 1u);
+  EXPECT_EQ(found("sim/campaigns/diagnosis/a.cc", "// wear grows\n"), 0u);
+  EXPECT_EQ(found("sim/campaigns/planting/a.cc", "if (cause == \"wear\") return;\n"), 0u);
 }
 
 }  // namespace

@@ -16,7 +16,8 @@ using LastFirst = std::vector<std::size_t>;
 LastFirst SeriesOf(const CampaignModel& model, EffectAxis axis) {
   LastFirst series;
   for (std::size_t t = model.terms.size(); t-- > 0;)
-    if (model.terms[t].form.axis == axis && IsOfAngle(model.terms[t].form.effect->cause))
+    if (model.terms[t].form.axis == axis &&
+        model.terms[t].form.effect->traits.IsOf(Family::kAngles))
       series.push_back(t);
   return series;
 }
@@ -37,9 +38,7 @@ void FitAnew(Fit* fit) {
 // Whether the structure follows the cause's own column: a bend there is the cause's shape, not
 // another structure.
 bool IsOwnShape(const Effect& effect, const UnknownFound& reported) {
-  constexpr std::string_view kOfDirection[] = {"thermal_backlash", "supply_drift"};
-  return std::ranges::count(kOfDirection, effect.cause) != 0 &&
-         std::ranges::count(effect.needs, reported.covariate) != 0 &&
+  return effect.traits.by_direction && std::ranges::count(effect.needs, reported.covariate) != 0 &&
          reported.channel.find("against its direction") != std::string::npos;
 }
 
@@ -51,10 +50,7 @@ auto AtAngleOf(EffectAxis axis) {
   };
 }
 
-// Whether the cause is a ripple of the gears, which is too fast to be the shape of a curve.
-bool IsRipple(std::string_view cause) { return cause == "stage_ripple" || cause == "tooth_mesh"; }
-
-bool IsBump(const ModelTerm& term) { return term.form.effect->cause == "tooth_damage"; }
+bool IsBump(const ModelTerm& term) { return term.form.effect->traits.is_bump; }
 
 // The series without the terms that are not part of the structure. A separate ripple explains as
 // much beside a curve for the structure as it does alone, whatever its many amplitudes cost.
@@ -83,7 +79,7 @@ LastFirst WithoutItsOwn(const Fit& fit, const LastFirst& series, const ModelTerm
   };
   LastFirst left;
   for (const std::size_t term : series)
-    if (!IsRipple(fit.model.terms[term].form.effect->cause) || !is_own(term)) left.push_back(term);
+    if (!fit.model.terms[term].form.effect->traits.is_ripple || !is_own(term)) left.push_back(term);
   return left;
 }
 
@@ -154,7 +150,7 @@ void DropBeaten(double family_wise, std::uint64_t seed, Fit* fit, Selection* sel
     const Effect& effect = *fit->model.terms[t].form.effect;
     if (IsBump(fit->model.terms[t]))
       beaten.DropIf({t}, -kClearly, AtAngleOf(fit->model.terms[t].form.axis));
-    else if (IsOfNight(effect.cause))
+    else if (effect.traits.IsOf(Family::kNight))
       beaten.DropIf({t}, kClearly,
                     [&](const UnknownFound& reported) { return !IsOwnShape(effect, reported); });
   }

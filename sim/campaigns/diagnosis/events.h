@@ -10,11 +10,9 @@
 
 #include "sim/campaigns/diagnosis/diagnosis.h"
 #include "sim/campaigns/diagnosis/fit.h"
+#include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {
-
-inline constexpr std::string_view kStepLoss = "step_loss", kLostCommand = "lost_command",
-                                  kContact = "collision_contact";
 
 /// The amplitude's unit of a cause that is made of steps.
 inline constexpr std::string_view kEvents = "events";

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "sim/campaigns/diagnosis/chances.h"
+#include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -257,7 +258,7 @@ struct UnitPair {
 };
 
 CauseFound SwapCause(const Campaign& campaign, const std::vector<UnitPair>& pairs) {
-  CauseFound cause = CauseNamed("identity_swap");
+  CauseFound cause = CauseNamed(kIdentitySwap);
   cause.axis = "none";
   cause.scope = "unit";
   cause.amplitude_unit = "pairs";

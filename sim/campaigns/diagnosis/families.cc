@@ -11,43 +11,15 @@
 
 #include "sim/campaigns/diagnosis/chances.h"
 #include "sim/campaigns/diagnosis/events.h"
+#include "sim/campaigns/effects/other_causes.h"
+#include "sim/campaigns/effects/rotor_ways.h"
 
 namespace focalfleet::sim {
 namespace {
 
-// Causes that depend on the direction and length of moves.
-constexpr std::string_view kMoves[] = {
-    "backlash",   "load_angle_lag", "relaxation",       "supply_droop",        "friction_windup",
-    "stiction",   "mode_threshold", "ramp_travel",      "scale_asymmetry",     "start_skew",
-    "gear_scale", "fibre_torque",   "thermal_backlash", "command_quantisation"};
-// Causes that depend on where the axis stands.
-constexpr std::string_view kAngles[] = {"gear_scale",     "eccentricity",   "pinion_runout",
-                                        "stage_ripple",   "tooth_mesh",     "tooth_damage",
-                                        "axis_tilt",      "hard_stop",      "fibre_torque",
-                                        "axis_crosstalk", "gravity_torque", "command_quantisation"};
-// Causes that drift as the night cools and the units run.
-constexpr std::string_view kNight[] = {"wear",          "thermal_backlash",   "self_heating",
-                                       "supply_drift",  "thermal_arm_growth", "plate_expansion",
-                                       "plate_gradient"};
-// Causes that move the whole image.
-constexpr std::string_view kImage[] = {"camera_similarity", "air_turbulence", "camera_distortion",
-                                       "plate_expansion",   "plate_gradient", "gravity_sag",
-                                       "axis_tilt"};
-// Causes that turn with the rotor.
-constexpr std::string_view kRotor[] = {"cogging", "phase_imbalance", "neighbour_coupling"};
-
-// Causes that are found by exact places, not by signatures.
-constexpr std::string_view kElsewhere[] = {"zero_offset",   "base_offset",  "arm_length",
-                                           "identity_swap", "lost_command", "step_loss",
-                                           "sensor_bias"};
-
-bool Has(std::span<const std::string_view> family, std::string_view cause) {
-  return std::find(family.begin(), family.end(), cause) != family.end();
-}
-
 // Whether the cause is found by exact places: what it explains is no shape of another.
 bool IsFoundElsewhere(const CauseFound& cause) {
-  return Has(kElsewhere, cause.cause) || cause.amplitude_unit == kEvents;
+  return TraitsOf(cause.cause).is_of_events || cause.amplitude_unit == kEvents;
 }
 
 bool IsCandidate(const CauseFound& cause, std::string_view name) {
@@ -93,7 +65,7 @@ double ShareBeside(const CauseFound& other, const CauseFound& cause) {
 // alike, in the rows of an exposure, and independently of the moves.
 bool IsOfTheAir(const CauseFound& air, const CauseFound& cause) {
   constexpr double kFaintBeside = 50, kOfAir = 0.4;  // ln L; size
-  return air.cause == "air_turbulence" && cause.scope != "unit" && cause.axis != "none" &&
+  return TraitsOf(air.cause).is_of_air && cause.scope != "unit" && cause.axis != "none" &&
          cause.delta_log_likelihood < kFaintBeside && cause.size_um < kOfAir * air.size_um;
 }
 
@@ -101,19 +73,19 @@ bool IsOfTheAir(const CauseFound& air, const CauseFound& cause) {
 // similarity, and units' own amplitudes take up the difference.
 bool MayBeOfTheCamera(const CauseFound& camera, const CauseFound& cause) {
   constexpr double kOfSize = 0.05, kOfEvidence = 0.1;
-  return camera.cause == "camera_similarity" && cause.axis != "none" && cause.scope == "unit" &&
+  return TraitsOf(camera.cause).is_of_camera && cause.axis != "none" && cause.scope == "unit" &&
          cause.size_um < kOfSize * camera.size_um &&
          cause.delta_log_likelihood < kOfEvidence * camera.delta_log_likelihood;
 }
 
-// Whether a tooth damage is faint in many units. A broken tooth belongs to one unit and is clear
-// there; a damage that many units have and none shows is no tooth.
+// Whether a bump is faint in many units. A broken tooth belongs to one unit and is clear there; a
+// bump that many units have and none shows is no tooth.
 bool IsFaintInMany(const CauseFound& cause) {
   constexpr std::size_t kMany = 5;
   constexpr double kMean = 4, kMost = 10;  // ln L of a unit
   const auto most = std::ranges::max_element(cause.evidence_of_unit, {},
                                              [](const auto& of_unit) { return of_unit.second; });
-  return cause.cause == "tooth_damage" && !cause.all_units && cause.units.size() >= kMany &&
+  return TraitsOf(cause.cause).is_bump && !cause.all_units && cause.units.size() >= kMany &&
          cause.delta_log_likelihood < kMean * static_cast<double>(cause.units.size()) &&
          (most == cause.evidence_of_unit.end() || most->second < kMost);
 }
@@ -125,14 +97,10 @@ bool AxesMeet(std::string_view a, std::string_view b) {
   return a == b || open(a) || open(b);
 }
 
-bool IsOfAngle(std::string_view cause) { return Has(kAngles, cause); }
-
-bool IsOfNight(std::string_view cause) { return Has(kNight, cause); }
-
 bool AreRelated(std::string_view a, std::string_view b) {
-  const std::span<const std::string_view> families[] = {kMoves, kAngles, kNight, kImage, kRotor};
-  return std::any_of(std::begin(families), std::end(families),
-                     [&](const auto& family) { return Has(family, a) && Has(family, b); });
+  const Traits& of_b = TraitsOf(b);
+  return std::ranges::any_of(TraitsOf(a).families,
+                             [&](Family family) { return of_b.IsOf(family); });
 }
 
 bool CanLeave(const CauseFound& of, const CauseFound& misfit_artefact) {
@@ -170,9 +138,9 @@ CauseFound* CauseThatLeaves(const UnknownFound& left, double noise_um,
                                 : left.channel.starts_with("phi") ? "phi"
                                                                   : "none";
   const auto leaves_um = [&](const CauseFound& cause) {
-    if (!cause.all_units || IsFoundElsewhere(cause) || cause.cause == "camera_similarity")
+    if (!cause.all_units || IsFoundElsewhere(cause) || TraitsOf(cause.cause).is_of_camera)
       return 0.0;
-    if (cause.cause == "air_turbulence") return axis == "none" ? kOfAir * cause.size_um : 0.0;
+    if (TraitsOf(cause.cause).is_of_air) return axis == "none" ? kOfAir * cause.size_um : 0.0;
     return AxesMeet(axis, cause.axis) ? kOfCause * cause.size_um : 0.0;
   };
   const auto most = std::ranges::max_element(*causes, {}, leaves_um);
@@ -299,8 +267,7 @@ void JudgeStrays(const Fit& fit, std::vector<CauseFound>* causes, OutliersFound*
   };
   std::set<std::uint32_t> strays;
   std::erase_if(*causes, [&](const CauseFound& cause) {
-    constexpr std::string_view kStatic[] = {"zero_offset", "base_offset", "arm_length"};
-    if (IsFoundElsewhere(cause) && !Has(kStatic, cause.cause)) return false;
+    if (IsFoundElsewhere(cause) && !TraitsOf(cause.cause).is_static) return false;
     if (cause.scope != "unit" || cause.units.empty() || cause.units.size() > kUnitsMax ||
         cause.units.size() * kOneIn > campaign.units.size() ||
         cause.size_um < kFar * fit.noise.typical_um)
@@ -344,7 +311,7 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
   // In 1200 hidden campaigns the sure names below 15 were right; later one at 14.95 was not.
   constexpr double kFar_deg = 12;
   constexpr double kSecond = 0.3;  // of the stronger cause's evidence
-  constexpr std::string_view kPair[] = {"cogging", "phase_imbalance"};
+  const auto bends = [](std::string_view name) { return TraitsOf(name).bends_with_field; };
   if (model.units.empty()) return;
   // Whether exact waves have decided the cause of its axes.
   const auto is_reported_by = [&](const CauseFound& cause, std::string_view name) {
@@ -352,20 +319,20 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
            (cause.axis == "theta" || reported[kPhi] == name);
   };
   for (CauseFound& cause : *causes) {
-    if (!Has(kPair, cause.cause) || is_reported_by(cause, cause.cause)) continue;
+    if (!bends(cause.cause) || is_reported_by(cause, cause.cause)) continue;
     const double turns = cause.axis == "theta" ? MedianGear(model, kTheta)
                          : cause.axis == "phi"
                              ? MedianGear(model, kPhi)
                              : std::max(MedianGear(model, kTheta), MedianGear(model, kPhi));
     if (std::abs(cause.amplitude) * turns <= kFar_deg) continue;
-    for (const std::string_view name : kPair)
+    for (const std::string_view name : RotorWayCauses())
       if (!IsCandidate(cause, name) && std::ranges::find(left_out, name) == left_out.end())
         cause.candidates.emplace_back(name);
   }
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     const auto stronger = std::ranges::find_if(kept, [&](const CauseFound& other) {
-      return cause.cause != other.cause && Has(kPair, cause.cause) && Has(kPair, other.cause) &&
+      return cause.cause != other.cause && bends(cause.cause) && bends(other.cause) &&
              AxesMeet(cause.axis, other.axis) &&
              (IsCandidate(cause, other.cause) ||
               (is_reported_by(cause, other.cause) && std::isfinite(ShareBeside(other, cause)))) &&
@@ -393,8 +360,6 @@ void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<Cau
 }
 
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {
-  // Slow waves of an angle, as a structure that follows it may have.
-  constexpr std::string_view kOfFollowed[] = {"eccentricity", "axis_tilt", "axis_crosstalk"};
   for (UnknownFound& left : *unknown) {
     const std::string axis = left.channel.starts_with("theta") ? "theta"
                              : left.channel.starts_with("phi") ? "phi"
@@ -407,7 +372,7 @@ void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFoun
                                                                     : "";
     std::erase_if(*causes, [&](const CauseFound& cause) {
       const bool meets =
-          cause.axis == axis || (cause.axis == followed && Has(kOfFollowed, cause.cause));
+          cause.axis == axis || (cause.axis == followed && TraitsOf(cause.cause).is_slow_wave);
       if (!meets || IsFoundElsewhere(cause) ||
           cause.delta_log_likelihood >= left.delta_log_likelihood)
         return false;
@@ -426,7 +391,7 @@ void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unk
     std::vector<CauseFound*> members;
     double square = 0;
     for (CauseFound& cause : *causes)
-      if (cause.axis == axis && Has(kAngles, cause.cause)) {
+      if (cause.axis == axis && TraitsOf(cause.cause).IsOf(Family::kAngles)) {
         members.push_back(&cause);
         square += cause.size_um * cause.size_um;
       }

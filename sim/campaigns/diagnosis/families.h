@@ -14,12 +14,6 @@ namespace focalfleet::sim {
 /// Whether the two causes have a family in common.
 bool AreRelated(std::string_view a, std::string_view b);
 
-/// Whether the cause depends on where an axis stands.
-bool IsOfAngle(std::string_view cause);
-
-/// Whether the cause drifts over a night.
-bool IsOfNight(std::string_view cause);
-
 /// Whether effects of the two axes can touch each other. The axes are names, and "both" and "none"
 /// touch all.
 bool AxesMeet(std::string_view a, std::string_view b);

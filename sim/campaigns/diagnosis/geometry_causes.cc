@@ -6,6 +6,7 @@
 
 #include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/chances.h"
+#include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -18,17 +19,17 @@ constexpr double kGeometrySizeMin_um =
     1;  // tables are rounded, and shared terms leave a trace in it
 
 struct Group {
-  const char* cause;
+  std::string_view cause;
   const char* axis;
   const char* unit;
   std::vector<Index> at;  // of the six static parameters
 };
 const std::vector<Group>& Groups() {
-  static const std::vector<Group> groups = {{"zero_offset", "theta", "deg", {4}},
-                                            {"zero_offset", "phi", "deg", {5}},
-                                            {"base_offset", "none", "mm", {0, 1}},
-                                            {"arm_length", "theta", "mm", {2}},
-                                            {"arm_length", "phi", "mm", {3}}};
+  static const std::vector<Group> groups = {{kZeroOffset, "theta", "deg", {4}},
+                                            {kZeroOffset, "phi", "deg", {5}},
+                                            {kBaseOffset, "none", "mm", {0, 1}},
+                                            {kArmLength, "theta", "mm", {2}},
+                                            {kArmLength, "phi", "mm", {3}}};
   return groups;
 }
 
@@ -193,7 +194,7 @@ CauseFound Report(const Fit& fit, const std::vector<UnitOffset>& offsets, const 
                   const GroupTest& test) {
   CauseFound cause;
   cause.cause = group.cause;
-  cause.candidates = {group.cause};
+  cause.candidates = {std::string(group.cause)};
   cause.axis = group.axis;
   cause.scope = "unit";
   cause.amplitude_unit = group.unit;

@@ -1,6 +1,7 @@
 #include "sim/campaigns/diagnosis/homings.h"
 
 #include "protocol/base/units.h"
+#include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {
 
@@ -19,7 +20,7 @@ HomingScatter ScatterOfHomings(const Fit& fit) {
 }
 
 CauseFound HomingCause(const Fit& fit) {
-  CauseFound cause = CauseNamed("zero_offset");
+  CauseFound cause = CauseNamed(kZeroOffset);
   cause.scope = "unit";
   cause.amplitude_unit = "deg";
   cause.shape = "differs from homing to homing; the amplitude is the rms of the larger axis";

@@ -8,11 +8,11 @@
 #include "sim/campaigns/diagnosis/chances.h"
 #include "sim/campaigns/diagnosis/image_followed.h"
 #include "sim/campaigns/diagnosis/term_trace.h"
+#include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::string_view kCameraSimilarity = "camera_similarity";
 constexpr std::size_t kImageUnitsMin = 6;
 constexpr double kNeighbourReach = 1.3;  // of the pitch
 constexpr double kNeighboursAgree = 6;   // standard deviations
@@ -358,11 +358,11 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
       ImageCause(motion.chi_square, std::max(size_um, turbulence_um), motion.seen.size());
   // Air is new at each exposure. A motion that is new as well may be air, however few the
   // neighbours.
-  if (!goes_on && !deformed.IsCamera()) cause.candidates.emplace_back("air_turbulence");
-  if (OnlyGrows(motion)) cause.candidates.emplace_back("plate_expansion");
-  if (!MovesAlongALine(motion)) cause.cannot_be.emplace_back("gravity_sag");
+  if (!goes_on && !deformed.IsCamera()) cause.candidates.emplace_back(kAirTurbulence);
+  if (OnlyGrows(motion)) cause.candidates.emplace_back(CauseOf(MotionOfImage::kGrows));
+  if (!MovesAlongALine(motion)) cause.cannot_be.emplace_back(CauseOf(MotionOfImage::kAlongALine));
   if (after > kNeighboursAgree || deformed.IsAir()) {
-    cause.cause = "air_turbulence";
+    cause.cause = kAirTurbulence;
     cause.candidates = {cause.cause};
     cause.size_um = std::hypot(size_um, turbulence_um);
     cause.amplitude = cause.size_um;
@@ -379,10 +379,9 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
 }
 
 void AddDriftAsRival(double drift_um, const Fit& fit, Selection* selection) {
-  constexpr std::string_view kOfImage[] = {"plate_expansion", "plate_gradient", "gravity_sag"};
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
     const ModelTerm& term = fit.model.terms[t];
-    if (std::ranges::count(kOfImage, term.form.effect->cause) != 0 &&
+    if (term.form.effect->traits.image_motion != MotionOfImage::kNone &&
         2 * drift_um > SizeOf(fit, term))
       selection->accepted[t].rivals.push_back({kCameraSimilarity, 0, 0, false});
   }

@@ -14,6 +14,7 @@
 #include "sim/campaigns/diagnosis/image_followed.h"
 #include "sim/campaigns/diagnosis/outliers.h"
 #include "sim/campaigns/diagnosis/term_trace.h"
+#include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -176,8 +177,7 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   // Steps of the image are a misfit of its motion where that follows a column.
   if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
                   [](const UnknownFound& reported) { return reported.channel == kImageShift; }))
-    std::erase_if(causes,
-                  [](const CauseFound& cause) { return cause.cause == "camera_similarity"; });
+    std::erase_if(causes, [](const CauseFound& cause) { return cause.cause == kCameraSimilarity; });
   JudgeMisfitArtefacts(fit.model.units.size(), &causes);
   std::vector<UnknownFound> nameless;
   JudgeNames(&causes, &nameless);

@@ -62,7 +62,7 @@ std::optional<std::size_t> TermOf(const Fit& fit, const CauseFound& cause) {
 
 bool ActsOnOthers(const Effect& effect) {
   return effect.owner == Owner::kRail || effect.owner == Owner::kBus ||
-         effect.cause == "neighbour_coupling" || effect.cause == "collision_contact";
+         effect.traits.acts_on_others;
 }
 
 // Units that show the term most. Where units act on each other, those around the one that shows it

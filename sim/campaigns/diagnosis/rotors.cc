@@ -12,45 +12,10 @@
 #include "sim/campaigns/diagnosis/term_trace.h"
 #include "sim/campaigns/effects/harmonic.h"
 #include "sim/campaigns/effects/registry.h"
+#include "sim/campaigns/effects/rotor_ways.h"
 
 namespace focalfleet::sim {
 namespace {
-
-constexpr std::string_view kCogging = "cogging", kImbalance = "phase_imbalance";
-
-// A way to turn a rotor: the error in electrical radians by the wave's phase in radians, and its
-// strength at drive 1.
-struct Way {
-  std::string_view cause;
-  double harmonic;  // of the motor's turn
-  double falls;     // power of the drive by which the strength falls
-  double (*error)(double harmonic, double wave_rad, double strength);
-};
-
-double Straight(double, double wave_rad, double strength) { return strength * std::sin(wave_rad); }
-
-double OfDetent(double harmonic, double wave_rad, double strength) {
-  return kRadiansPerDegree * DetentError(harmonic, wave_rad / kRadiansPerDegree, strength);
-}
-
-// Ellipse and shifted circle: the field is 1 + strength exp(-i wave) in its own frame.
-double OfField(double, double wave_rad, double strength) {
-  return std::atan2(-strength * std::sin(wave_rad), 1 + strength * std::cos(wave_rad));
-}
-
-// The lost voltage points to the middle of the sixth of a turn that the field is in.
-double OfDeadTime(double harmonic, double wave_rad, double strength) {
-  const double within = std::remainder(wave_rad, 2 * std::numbers::pi) / harmonic;
-  return std::atan2(strength * std::sin(within), 1 - strength * std::cos(within));
-}
-
-constexpr Way kWays[] = {
-    {kCogging, 1, 1, OfDetent},   {kCogging, 2, 1, OfDetent},   {kCogging, 4, 1, OfDetent},
-    {kCogging, 6, 1, OfDetent},   {kCogging, 1, 1, Straight},   {kCogging, 2, 1, Straight},
-    {kCogging, 4, 1, Straight},   {kCogging, 6, 1, Straight},   {kCogging, 1, 2, Straight},
-    {kCogging, 2, 2, Straight},   {kCogging, 4, 2, Straight},   {kCogging, 6, 2, Straight},
-    {kImbalance, 1, 1, OfField},  {kImbalance, 2, 0, OfField},  {kImbalance, 6, 1, OfDeadTime},
-    {kImbalance, 1, 1, Straight}, {kImbalance, 2, 0, Straight}, {kImbalance, 6, 1, Straight}};
 
 // The angle errors of a unit's axis, and the conditions that they depend on.
 struct RotorRow {
@@ -91,7 +56,7 @@ Rotor RotorOf(const Fit& fit, std::size_t unit, std::size_t axis) {
 }
 
 // -2 ln L of the rows by a robust density, with a zero of their own.
-double CostOf(const Rotor& rotor, const Way& way, double strength, double phase_rad,
+double CostOf(const Rotor& rotor, const RotorWay& way, double strength, double phase_rad,
               std::vector<double>* left) {
   left->clear();
   double sum = 0, weights = 0;
@@ -112,7 +77,7 @@ double CostOf(const Rotor& rotor, const Way& way, double strength, double phase_
 }
 
 // The least cost over strength and phase: a grid, then smaller and smaller steps about the best.
-double LeastCost(const Rotor& rotor, const Way& way) {
+double LeastCost(const Rotor& rotor, const RotorWay& way) {
   constexpr double kLow = 0.03, kRatio = 1.5;
   constexpr int kStrengths = 10, kPhases = 24, kHalvings = 6;
   std::vector<double> left;
@@ -137,8 +102,7 @@ double LeastCost(const Rotor& rotor, const Way& way) {
 }
 
 bool IsOfRotor(const ModelTerm& term, std::size_t axis) {
-  return (term.form.effect->cause == kCogging || term.form.effect->cause == kImbalance) &&
-         AxisIndex(term.form) == axis;
+  return term.form.effect->traits.bends_with_field && AxisIndex(term.form) == axis;
 }
 
 // The term of the axis with the largest effect; kNoTerm: it has none.
@@ -162,22 +126,23 @@ bool IsFar(const Fit& fit, std::size_t term, double far_deg) {
 
 // The best way of a cause, the same for all units, and its cost.
 struct BestWay {
-  const Way* way = nullptr;
+  const RotorWay* way = nullptr;
   double cost = std::numeric_limits<double>::infinity();
 };
 BestWay BestWayOf(std::string_view cause, const std::vector<Rotor>& rotors,
                   const ParallelFor& parallel) {
+  const std::span<const RotorWay> ways = RotorWays();
   const std::size_t count = rotors.size();
-  std::vector<double> cost(std::size(kWays) * count);
+  std::vector<double> cost(ways.size() * count);
   parallel(cost.size(), [&](std::size_t k) {
-    if (kWays[k / count].cause == cause) cost[k] = LeastCost(rotors[k % count], kWays[k / count]);
+    if (ways[k / count].cause == cause) cost[k] = LeastCost(rotors[k % count], ways[k / count]);
   });
   BestWay best;
-  for (std::size_t k = 0; k < std::size(kWays); ++k) {
-    if (kWays[k].cause != cause) continue;
+  for (std::size_t k = 0; k < ways.size(); ++k) {
+    if (ways[k].cause != cause) continue;
     const auto from = cost.begin() + static_cast<std::ptrdiff_t>(k * count);
     const double sum = std::accumulate(from, from + static_cast<std::ptrdiff_t>(count), 0.0);
-    if (sum < best.cost) best = {&kWays[k], sum};
+    if (sum < best.cost) best = {&ways[k], sum};
   }
   return best;
 }
@@ -233,8 +198,8 @@ std::size_t LeaveAlone(std::size_t at, Fit* fit, Selection* selection) {
 
 // Exchanges the term for the bent wave of another cause in the same units, with rivals of its own.
 // False where these data have no such wave.
-bool Exchange(const Templates& templates, const SelectionRule& rule, const Way& way, std::size_t at,
-              Fit* fit, Selection* selection) {
+bool Exchange(const Templates& templates, const SelectionRule& rule, const RotorWay& way,
+              std::size_t at, Fit* fit, Selection* selection) {
   constexpr int kRounds = 2;
   const EffectAxis axis = fit->model.terms[at].form.axis;
   const Templates forms = ListTemplates(*FindEffect(way.cause), *fit->facts);
@@ -265,41 +230,25 @@ double MedianGear(const CampaignModel& model, std::size_t axis) {
   return Median(std::move(gears));
 }
 
-double DetentError(double harmonic, double wave_deg, double detent) {
-  // The lag nearest to zero: sin(lag) - detent sin(wave - n lag) goes from -sin(wave) to its first
-  // zero.
-  const double wave = wave_deg * kRadiansPerDegree;
-  const auto excess = [&](double lag) {
-    return std::sin(lag) - detent * std::sin(wave - harmonic * lag);
-  };
-  const double sign = std::sin(wave) >= 0 ? 1 : -1;
-  const double step = 0.25 / std::max(harmonic, 1.0);
-  double low = 0, high = 0;
-  while (sign * excess(sign * high) < 0 && high < std::numbers::pi / 2) low = high, high += step;
-  constexpr int kHalvings = 24;
-  for (int i = 0; i < kHalvings; ++i) {
-    const double middle = (low + high) / 2;
-    (sign * excess(sign * middle) < 0 ? low : high) = middle;
-  }
-  return -sign * (low + high) / 2 / kRadiansPerDegree;
-}
-
 RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
                          const std::vector<std::string>& left_out, Fit* fit, Selection* selection) {
   constexpr double kFar_deg = 8;  // electrical: a smaller turn is a sine by either cause
   RotorCauses reported;
   if (!fit->facts->Has("drive_amplitude")) return reported;
-  for (const std::string_view name : {kCogging, kImbalance})
+  const std::span<const std::string_view> causes = RotorWayCauses();
+  for (const std::string_view name : causes)
     if (std::ranges::find(left_out, name) != left_out.end()) return reported;
   for (const std::size_t axis : {std::size_t{kTheta}, std::size_t{kPhi}}) {
     std::vector<double> square_um2;
     const std::size_t at = StrongestOfAxis(*fit, axis, &square_um2);
     if (at == kNoTerm || !IsFar(*fit, at, kFar_deg)) continue;
     const std::vector<Rotor> rotors = TakeRotors(*fit, axis, square_um2);
-    const BestWay cogging = BestWayOf(kCogging, rotors, fit->parallel);
-    const BestWay field = BestWayOf(kImbalance, rotors, fit->parallel);
-    if (!IsClear(cogging, field, rotors)) continue;
-    const Way& way = cogging.cost < field.cost ? *cogging.way : *field.way;
+    std::vector<BestWay> best;
+    for (const std::string_view cause : causes)
+      best.push_back(BestWayOf(cause, rotors, fit->parallel));
+    std::ranges::stable_sort(best, {}, &BestWay::cost);
+    if (!IsClear(best[0], best[1], rotors)) continue;
+    const RotorWay& way = *best[0].way;
     if (fit->model.terms[at].form.effect->cause != way.cause &&
         !Exchange(templates, rule, way, at, fit, selection))
       continue;
@@ -308,7 +257,7 @@ RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
       if (IsOfRotor(fit->model.terms[t], axis) &&
           fit->model.terms[t].form.effect->cause == way.cause)
         std::erase_if(selection->accepted[t].rivals, [](const Rival& rival) {
-          return rival.cause == kCogging || rival.cause == kImbalance;
+          return std::ranges::count(RotorWayCauses(), rival.cause) != 0;
         });
   }
   return reported;

@@ -35,9 +35,4 @@ RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
 /// Turns of the motor per turn of the axis, the median of the units. Pre: there are units.
 double MedianGear(const CampaignModel& model, std::size_t axis);
 
-/// The angle from the commanded one at which the rotor comes to rest.
-/// Units: degrees, electrical. `detent`: of the pull-out torque at this drive. `wave_deg`: n times
-/// the angle, and a phase.
-double DetentError(double harmonic, double wave_deg, double detent);
-
 }  // namespace focalfleet::sim

@@ -12,6 +12,7 @@
 
 #include "sim/campaigns/diagnosis/diagnosis.h"
 #include "sim/campaigns/diagnosis/fit.h"
+#include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {
 
@@ -25,8 +26,6 @@ struct TrueTemperatures {
   double gain_sigma = 0;       // of one of them
   bool are_half = false;       // of the units with readings: the other half may be wrong as well
 };
-
-inline constexpr std::string_view kSensorBias = "sensor_bias";
 
 /// The reason why sensors cannot be tested; empty where they are.
 std::string WhyNoSensorIsTested(const CampaignFacts& facts);

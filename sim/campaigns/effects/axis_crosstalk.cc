@@ -37,7 +37,8 @@ Effect MakeAxisCrosstalk() {
               "shaft, or a bearing's drag. Move the axes one after the other to see it.",
           .list = ListAxisCrosstalk,
           .apply = ApplyAxisCrosstalk,
-          .of_poses_alone = EachForm};
+          .of_poses_alone = EachForm,
+          .traits = {.families = {Family::kAngles}, .is_slow_wave = true}};
 }
 
 }  // namespace focalfleet::sim

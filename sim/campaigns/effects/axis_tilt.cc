@@ -53,7 +53,8 @@ Effect MakeAxisTilt() {
               "distortion of the camera looks alike on one unit, not on a plate full of them.",
           .list = ListAxisTilt,
           .apply = ApplyAxisTilt,
-          .of_poses_alone = EachForm};
+          .of_poses_alone = EachForm,
+          .traits = {.families = {Family::kAngles, Family::kImage}, .is_slow_wave = true}};
 }
 
 }  // namespace focalfleet::sim

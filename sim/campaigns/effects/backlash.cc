@@ -46,7 +46,8 @@ Effect MakeBacklash() {
           .apply = ApplyBacklash,
           .of_poses_alone = EachForm,
           .continuous_shape = true,
-          .amplitude_is_shape = true};
+          .amplitude_is_shape = true,
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

@@ -58,7 +58,8 @@ Effect MakeCameraDistortion() {
               "displacements that grow with the third power of the distance from its centre, "
               "the same at every exposure.",
           .list = ListCameraDistortion,
-          .apply = ApplyCameraDistortion};
+          .apply = ApplyCameraDistortion,
+          .traits = {.families = {Family::kImage}}};
 }
 
 }  // namespace focalfleet::sim

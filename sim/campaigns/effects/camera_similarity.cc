@@ -42,7 +42,8 @@ Effect MakeCameraSimilarity() {
               "each exposure to fiducials.",
           .list = ListCameraSimilarity,
           .apply = ApplyCameraSimilarity,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .traits = {.families = {Family::kImage}, .is_of_camera = true}};
 }
 
 }  // namespace focalfleet::sim

@@ -48,7 +48,8 @@ Effect MakeCogging() {
           .list = ListCogging,
           .apply = ApplyCogging,
           // At one drive level the pull of the poles is a ripple like that of the phases.
-          .passes_for = {"phase_imbalance"}};
+          .passes_for = {"phase_imbalance"},
+          .traits = {.families = {Family::kRotor}, .bends_with_field = true}};
 }
 
 }  // namespace focalfleet::sim

@@ -42,7 +42,8 @@ Effect MakeCollisionContact() {
           .apply = ApplyCollisionContact,
           .continuous_shape = true,
           .amplitude_low = 0,
-          .amplitude_high = 1.5};
+          .amplitude_high = 1.5,
+          .traits = {.families = {}, .acts_on_others = true}};
 }
 
 }  // namespace focalfleet::sim

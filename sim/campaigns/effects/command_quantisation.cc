@@ -121,7 +121,8 @@ Effect MakeCommandQuantisation() {
           .own_shape = true,
           .amplitude_low = 0,
           .amplitude_high = 1.5,
-          .amplitude_least = 0.5};
+          .amplitude_least = 0.5,
+          .traits = {.families = {Family::kMoves, Family::kAngles}}};
 }
 
 }  // namespace focalfleet::sim

@@ -26,7 +26,8 @@ Effect MakeEccentricity() {
               "own.",
           .list = ListEccentricity,
           .apply = ApplyEccentricity,
-          .of_poses_alone = EachForm};
+          .of_poses_alone = EachForm,
+          .traits = {.families = {Family::kAngles}, .is_slow_wave = true}};
 }
 
 }  // namespace focalfleet::sim

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "sim/campaigns/effects/track.h"
+#include "sim/campaigns/effects/traits.h"
 
 namespace focalfleet::sim {
 
@@ -118,6 +119,7 @@ struct Effect {
   bool (*shows)(const Template&, const CampaignFacts&) = nullptr;
   // Causes whose trace this one may pass for where one of `needs` is missing from the campaign.
   std::vector<std::string_view> passes_for = {};
+  Traits traits = {};
 };
 
 /// The `of_poses_alone` of an effect whose forms are all so.

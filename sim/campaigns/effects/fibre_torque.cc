@@ -55,7 +55,8 @@ Effect MakeFibreTorque() {
           .list = ListFibreTorque,
           .apply = ApplyFibreTorque,
           .of_poses_alone = EachForm,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .traits = {.families = {Family::kMoves, Family::kAngles}}};
 }
 
 }  // namespace focalfleet::sim

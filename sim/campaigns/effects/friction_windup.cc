@@ -41,7 +41,8 @@ Effect MakeFrictionWindup() {
           .list = ListFrictionWindup,
           .apply = ApplyFrictionWindup,
           .of_poses_alone = EachForm,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

@@ -34,7 +34,8 @@ Effect MakeGearScale() {
           .apply = ApplyGearScale,
           .of_poses_alone = EachForm,
           .amplitude_low = -1,  // an axis that stands still
-          .amplitude_high = 0.5};
+          .amplitude_high = 0.5,
+          .traits = {.families = {Family::kMoves, Family::kAngles}}};
 }
 
 }  // namespace focalfleet::sim

@@ -39,7 +39,8 @@ Effect MakeGravitySag() {
           .list = ListGravitySag,
           .apply = ApplyGravitySag,
           // Without elevations a plate that sags is a shift of the image.
-          .passes_for = {"camera_similarity"}};
+          .passes_for = {"camera_similarity"},
+          .traits = {.families = {Family::kImage}, .image_motion = MotionOfImage::kAlongALine}};
 }
 
 }  // namespace focalfleet::sim

@@ -57,7 +57,8 @@ Effect MakeGravityTorque() {
           .apply = ApplyGravityTorque,
           .continuous_shape = true,
           // At one elevation the side of the gears goes with the angle alone.
-          .passes_for = {"eccentricity"}};
+          .passes_for = {"eccentricity"},
+          .traits = {.families = {Family::kAngles}}};
 }
 
 }  // namespace focalfleet::sim

@@ -49,7 +49,8 @@ Effect MakeHardStop() {
           .list = ListHardStop,
           .apply = ApplyHardStop,
           .of_poses_alone = EachForm,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .traits = {.families = {Family::kAngles}}};
 }
 
 }  // namespace focalfleet::sim

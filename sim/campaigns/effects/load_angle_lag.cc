@@ -61,7 +61,8 @@ Effect MakeLoadAngleLag() {
           .continuous_shape = true,
           .shows = ShowsLoadAngleLag,
           // At one drive level a lag is play.
-          .passes_for = {"backlash"}};
+          .passes_for = {"backlash"},
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

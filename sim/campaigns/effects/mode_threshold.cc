@@ -94,7 +94,8 @@ Effect MakeModeThreshold() {
           .apply = ApplyModeThreshold,
           .of_poses_alone = ReadsNoMode,
           .continuous_shape = true,
-          .shows = ShowsModeThreshold};
+          .shows = ShowsModeThreshold,
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

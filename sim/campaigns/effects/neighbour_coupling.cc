@@ -68,7 +68,8 @@ Effect MakeNeighbourCoupling() {
               "The magnets of a neighbour's motor pull at this one's rotor, by the angle "
               "between the two and the cube of their distance.",
           .list = ListNeighbourCoupling,
-          .apply = ApplyNeighbourCoupling};
+          .apply = ApplyNeighbourCoupling,
+          .traits = {.families = {Family::kRotor}, .acts_on_others = true}};
 }
 
 }  // namespace focalfleet::sim

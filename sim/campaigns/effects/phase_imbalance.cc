@@ -56,7 +56,8 @@ Effect MakePhaseImbalance() {
               "voltages: a ripple of one, two or six periods a motor turn. That of gains does not "
               "know the drive level, the others fall with it.",
           .list = ListPhaseImbalance,
-          .apply = ApplyPhaseImbalance};
+          .apply = ApplyPhaseImbalance,
+          .traits = {.families = {Family::kRotor}, .bends_with_field = true}};
 }
 
 }  // namespace focalfleet::sim

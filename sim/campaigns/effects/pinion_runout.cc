@@ -29,7 +29,8 @@ Effect MakePinionRunout() {
               "that nothing but a gear of its own tells them apart.",
           .list = ListPinionRunout,
           .apply = ApplyPinionRunout,
-          .of_poses_alone = EachForm};
+          .of_poses_alone = EachForm,
+          .traits = {.families = {Family::kAngles}}};
 }
 
 }  // namespace focalfleet::sim

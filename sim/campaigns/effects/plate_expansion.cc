@@ -48,7 +48,9 @@ Effect MakePlateExpansion() {
           .apply = ApplyPlateExpansion,
           .continuous_shape = true,
           // Without temperatures a plate that grows is a camera that scales.
-          .passes_for = {"camera_similarity"}};
+          .passes_for = {"camera_similarity"},
+          .traits = {.families = {Family::kNight, Family::kImage},
+                     .image_motion = MotionOfImage::kGrows}};
 }
 
 }  // namespace focalfleet::sim

@@ -62,7 +62,9 @@ Effect MakePlateGradient() {
           // The range is far beyond any metal's: sensors at the units see only a part of the
           // plate's gradient.
           .amplitude_low = -0.01,
-          .amplitude_high = 0.01};
+          .amplitude_high = 0.01,
+          .traits = {.families = {Family::kNight, Family::kImage},
+                     .image_motion = MotionOfImage::kBends}};
 }
 
 }  // namespace focalfleet::sim

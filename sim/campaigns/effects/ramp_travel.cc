@@ -46,7 +46,8 @@ Effect MakeRampTravel() {
           .apply = ApplyRampTravel,
           .of_poses_alone = EachForm,
           .amplitude_low = -10,
-          .amplitude_high = 10};
+          .amplitude_high = 10,
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

@@ -86,7 +86,8 @@ Effect MakeRelaxation() {
           .continuous_shape = true,
           .shows = ShowsRelaxation,
           // At one delay a creep that is not over is play.
-          .passes_for = {"backlash"}};
+          .passes_for = {"backlash"},
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

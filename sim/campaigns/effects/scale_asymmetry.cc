@@ -33,7 +33,8 @@ Effect MakeScaleAsymmetry() {
               "direction does this; so does a supply that is weaker one way.",
           .list = ListScaleAsymmetry,
           .apply = ApplyScaleAsymmetry,
-          .of_poses_alone = EachForm};
+          .of_poses_alone = EachForm,
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

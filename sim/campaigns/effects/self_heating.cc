@@ -78,7 +78,8 @@ Effect MakeSelfHeating() {
               "constant of minutes. Pause, or spread the moves.",
           .list = ListSelfHeating,
           .apply = ApplySelfHeating,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .traits = {.families = {Family::kNight}}};
 }
 
 }  // namespace focalfleet::sim

@@ -105,7 +105,8 @@ Effect MakeStartSkew() {
           .continuous_shape = true,
           .shows = ShowsStartSkew,
           // Without places in the order a late start is play.
-          .passes_for = {"backlash"}};
+          .passes_for = {"backlash"},
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

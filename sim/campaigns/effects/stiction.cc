@@ -63,7 +63,8 @@ Effect MakeStiction() {
           .continuous_shape = true,
           .amplitude_low = 0,
           .amplitude_high = 1.2,
-          .amplitude_least = 0.3};
+          .amplitude_least = 0.3,
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

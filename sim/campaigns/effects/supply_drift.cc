@@ -56,7 +56,8 @@ Effect MakeSupplyDrift() {
           .list = ListSupplyDrift,
           .apply = ApplySupplyDrift,
           // Over a night the air cools as the supply sinks.
-          .passes_for = {"thermal_backlash"}};
+          .passes_for = {"thermal_backlash"},
+          .traits = {.families = {Family::kNight}, .by_direction = true}};
 }
 
 }  // namespace focalfleet::sim

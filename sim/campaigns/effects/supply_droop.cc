@@ -144,7 +144,8 @@ Effect MakeSupplyDroop() {
           .apply = ApplySupplyDroop,
           .continuous_shape = true,
           // Without counts of the movers a sag is play.
-          .passes_for = {"backlash"}};
+          .passes_for = {"backlash"},
+          .traits = {.families = {Family::kMoves}}};
 }
 
 }  // namespace focalfleet::sim

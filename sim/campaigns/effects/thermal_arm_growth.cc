@@ -45,7 +45,8 @@ Effect MakeThermalArmGrowth() {
           .apply = ApplyThermalArmGrowth,
           .continuous_shape = true,
           // Without temperatures arms that grow over a night are warmed by their motors.
-          .passes_for = {"self_heating"}};
+          .passes_for = {"self_heating"},
+          .traits = {.families = {Family::kNight}}};
 }
 
 }  // namespace focalfleet::sim

@@ -66,7 +66,8 @@ Effect MakeToothDamage() {
           .of_poses_alone = EachForm,
           .continuous_shape = true,
           .own_shape = true,
-          .shows = ShowsToothDamage};
+          .shows = ShowsToothDamage,
+          .traits = {.families = {Family::kAngles}, .is_bump = true}};
 }
 
 }  // namespace focalfleet::sim

@@ -43,7 +43,8 @@ Effect MakeToothMesh() {
               "all around or deeper on one side.",
           .list = ListToothMesh,
           .apply = ApplyToothMesh,
-          .of_poses_alone = EachForm};
+          .of_poses_alone = EachForm,
+          .traits = {.families = {Family::kAngles}, .is_ripple = true}};
 }
 
 }  // namespace focalfleet::sim

@@ -73,7 +73,8 @@ Effect MakeWear() {
           .apply = ApplyWear,
           .one_is_enough = true,
           .amplitude_low = -20,  // a gear that falls apart
-          .amplitude_high = 20};
+          .amplitude_high = 20,
+          .traits = {.families = {Family::kNight}}};
 }
 
 }  // namespace focalfleet::sim

@@ -11,7 +11,7 @@
 
 #include "daemon/campaign/diagnosis_files.h"
 #include "protocol/base/rng.h"
-#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/planting/planted.h"
 
 namespace focalfleet {
 namespace {

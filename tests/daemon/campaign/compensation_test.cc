@@ -10,7 +10,7 @@
 #include "daemon/campaign/campaign_log.h"
 #include "fleet/hex_layout.h"
 #include "protocol/base/rng.h"
-#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/planting/planted.h"
 #include "sim/campaigns/effects/empirical.h"
 #include "sim/campaigns/effects/registry.h"
 #include "tests/support/seed.h"

@@ -7,7 +7,7 @@
 
 #include "daemon/campaign/move_list.h"
 #include "fleet/hex_layout.h"
-#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/planting/planted.h"
 
 namespace focalfleet {
 namespace {

@@ -22,7 +22,7 @@
 #include "daemon/campaign/verdict_sentence.h"
 #include "fleet/files/layout_file.h"
 #include "tests/sim/campaigns/campaign/odd_places.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet {
 namespace {

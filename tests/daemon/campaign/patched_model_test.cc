@@ -11,7 +11,7 @@
 #include "daemon/campaign/model_file.h"
 #include "daemon/campaign/verdict_sentence.h"
 #include "sim/campaigns/effects/empirical.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet {
 namespace {

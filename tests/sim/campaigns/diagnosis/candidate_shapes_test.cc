@@ -7,7 +7,7 @@
 
 #include "sim/campaigns/effects/harmonic.h"
 #include "sim/campaigns/effects/registry.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "sim/campaigns/diagnosis/homings.h"
 #include "sim/campaigns/effects/registry.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

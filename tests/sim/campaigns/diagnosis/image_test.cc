@@ -13,7 +13,7 @@
 #include "sim/campaigns/diagnosis/image_followed.h"
 #include "sim/campaigns/diagnosis/term_trace.h"
 #include "sim/campaigns/effects/registry.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

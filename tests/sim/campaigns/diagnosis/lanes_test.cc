@@ -4,7 +4,7 @@
 #include "sim/campaigns/diagnosis/fit.h"
 #include "sim/campaigns/diagnosis/neighbour_sum.h"
 #include "sim/campaigns/effects/registry.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

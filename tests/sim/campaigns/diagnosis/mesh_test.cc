@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "sim/campaigns/diagnosis/multi_start.h"
 #include "sim/campaigns/diagnosis/select.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "tests/sim/campaigns/campaign/odd_places.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

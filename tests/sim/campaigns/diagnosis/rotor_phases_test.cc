@@ -9,7 +9,7 @@
 
 #include "protocol/base/rng.h"
 #include "protocol/base/units.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

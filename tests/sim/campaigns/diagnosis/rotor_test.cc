@@ -9,7 +9,8 @@
 
 #include "sim/campaigns/diagnosis/rotors.h"
 #include "sim/campaigns/effects/registry.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "sim/campaigns/effects/rotor_ways.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

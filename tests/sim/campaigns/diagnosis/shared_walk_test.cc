@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

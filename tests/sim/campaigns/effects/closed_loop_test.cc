@@ -12,7 +12,7 @@
 
 #include "protocol/base/rng.h"
 #include "sim/campaigns/diagnosis/far_angles.h"
-#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/planting/planted.h"
 #include "sim/campaigns/effects/registry.h"
 #include "tests/support/seed.h"
 

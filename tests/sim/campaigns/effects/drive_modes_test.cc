@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "sim/campaigns/diagnosis/left_by.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/planting/planted.h"
 #include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet::sim {

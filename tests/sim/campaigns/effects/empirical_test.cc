@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "protocol/base/rng.h"
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -1,9 +1,9 @@
 // Planted causes that no effect of the library makes are found again.
-#include "sim/campaigns/diagnosis/planted_faults.h"
+#include "sim/campaigns/planting/planted_faults.h"
 
 #include <gmock/gmock.h>
 
-#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "sim/campaigns/diagnosis/planted.h"
 #include "sim/campaigns/effects/track.h"
+#include "sim/campaigns/planting/planted.h"
 
 namespace focalfleet::sim {
 

@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/planting/planted.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 
 #include "protocol/base/rng.h"
 #include "sim/campaigns/diagnosis/model.h"
-#include "sim/campaigns/diagnosis/planted_faults.h"
 #include "sim/campaigns/effects/registry.h"
+#include "sim/campaigns/planting/planted_faults.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -13,7 +13,7 @@
 #include "protocol/base/rng.h"
 #include "sim/campaigns/diagnosis/diagnosis.h"
 #include "sim/campaigns/diagnosis/fit.h"
-#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/planting/planted.h"
 
 namespace focalfleet::sim::test {
 

@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/planted_faults.h"
+#include "sim/campaigns/planting/planted_faults.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,15 +12,16 @@
 #include "protocol/base/rng.h"
 #include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/exchanged.h"
+#include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {
 namespace {
 
 using ComplexPlane = std::complex<double>;  // x + i y, mm
 
-constexpr std::string_view kFaults[] = {"lost_command", "step_loss", "identity_swap", "sensor_bias",
-                                        "air_turbulence"};
-constexpr std::string_view kCounted[] = {"lost_command", "step_loss", "identity_swap"};
+constexpr std::string_view kFaults[] = {kLostCommand, kStepLoss, kIdentitySwap, kSensorBias,
+                                        kAirTurbulence};
+constexpr std::string_view kCounted[] = {kLostCommand, kStepLoss, kIdentitySwap};
 
 bool IsOf(std::span<const std::string_view> causes, std::string_view cause) {
   return std::ranges::find(causes, cause) != causes.end();
@@ -83,7 +84,7 @@ void LoseMoves(const PlantedEffect& planted, const CampaignFacts& facts, Rng* rn
   static constexpr std::size_t kBoth[] = {kTheta, kPhi};
   const std::size_t axis = planted.axis == "phi" ? kPhi : kTheta;
   Loss loss{.axes = kBoth};
-  if (planted.cause == "step_loss")
+  if (planted.cause == kStepLoss)
     loss.axes = std::span(&kBoth[axis], 1), loss.turns = planted.amplitude;
   else
     loss.moves = static_cast<std::size_t>(planted.amplitude);
@@ -170,7 +171,7 @@ bool IsPlantedFault(std::string_view cause) { return IsOf(kFaults, cause); }
 
 Status PlantFault(const PlantedEffect& planted, const CampaignFacts& facts, std::uint64_t seed,
                   Campaign* campaign) {
-  const bool of_an_axis = planted.cause == "step_loss";
+  const bool of_an_axis = planted.cause == kStepLoss;
   const bool is_axis = planted.axis == "theta" || planted.axis == "phi";
   if (!planted.axis.empty() && !(of_an_axis && is_axis))
     return Fail(ErrorCode::kInvalid, planted.cause + ": not on axis '" + planted.axis + "' here");
@@ -180,11 +181,11 @@ Status PlantFault(const PlantedEffect& planted, const CampaignFacts& facts, std:
                                          planted.amplitude == std::floor(planted.amplitude)))
     return Fail(ErrorCode::kInvalid, planted.cause + ": a whole number from 1 on is expected");
   Rng rng = Rng::Stream(seed, planted.cause);
-  if (planted.cause == "lost_command" || planted.cause == "step_loss")
+  if (planted.cause == kLostCommand || planted.cause == kStepLoss)
     LoseMoves(planted, facts, &rng, campaign);
-  else if (planted.cause == "identity_swap")
+  else if (planted.cause == kIdentitySwap)
     return ExchangeNames(planted, facts, &rng, campaign);
-  else if (planted.cause == "sensor_bias")
+  else if (planted.cause == kSensorBias)
     DistortTemperatures(planted, facts, &rng, campaign);
   else
     MoveAir(planted, facts, &rng, campaign);

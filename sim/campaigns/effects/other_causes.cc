@@ -1,0 +1,32 @@
+#include "sim/campaigns/effects/other_causes.h"
+
+#include <map>
+
+#include "sim/campaigns/effects/registry.h"
+
+namespace focalfleet::sim {
+
+const Traits& TraitsOf(std::string_view cause) {
+  static const std::map<std::string_view, Traits> others = {
+      {kZeroOffset, {.families = {}, .is_static = true, .is_of_events = true}},
+      {kBaseOffset, {.families = {}, .is_static = true, .is_of_events = true}},
+      {kArmLength, {.families = {}, .is_static = true, .is_of_events = true}},
+      {kIdentitySwap, {.families = {}, .is_of_events = true}},
+      {kLostCommand, {.families = {}, .is_of_events = true}},
+      {kStepLoss, {.families = {}, .is_of_events = true}},
+      {kSensorBias, {.families = {}, .is_of_events = true}},
+      {kAirTurbulence, {.families = {Family::kImage}, .is_of_air = true}}};
+  static const Traits none;
+  if (const auto other = others.find(cause); other != others.end()) return other->second;
+  const Effect* effect = FindEffect(cause);
+  return effect != nullptr ? effect->traits : none;
+}
+
+std::string_view CauseOf(MotionOfImage motion) {
+  return std::ranges::find_if(
+             EffectLibrary(),
+             [&](const Effect& effect) { return effect.traits.image_motion == motion; })
+      ->cause;
+}
+
+}  // namespace focalfleet::sim
