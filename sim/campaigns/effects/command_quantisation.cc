@@ -12,6 +12,7 @@ enum class Rounding {
   kNearest,
   kCutMove,
   kDown,
+  kTowardsZero,
   kCutMean,  // moves are cut to a step too fine to be known: half a step is lost in each, on
              // average
 };
@@ -30,6 +31,7 @@ constexpr std::array kForms = {
     RoundingForm{Step::kDegrees, Rounding::kDown, "rounded down; step, deg,"},
     RoundingForm{Step::kBits, Rounding::kDown, "rounded down; bits a turn:"},
     RoundingForm{Step::kDegrees, Rounding::kCutMean, "moves are cut; on average; step, deg,"},
+    RoundingForm{Step::kDegrees, Rounding::kTowardsZero, "cut towards zero; step, deg,"},
 };
 
 std::vector<double> ShapesOf(const RoundingForm& form) {
@@ -43,6 +45,12 @@ std::vector<double> ShapesOf(const RoundingForm& form) {
 
 bool IsCut(const RoundingForm& form) {
   return form.rounding == Rounding::kCutMove || form.rounding == Rounding::kCutMean;
+}
+
+// The whole steps that the controller takes of so many.
+double WholeSteps(Rounding rounding, double steps) {
+  if (rounding == Rounding::kDown) return std::floor(steps);
+  return rounding == Rounding::kTowardsZero ? std::trunc(steps) : std::round(steps);
 }
 
 double Step_deg(const RoundingForm& form, double shape, double gear) {
@@ -95,9 +103,8 @@ void ApplyCommandQuantisation(const UnitTrack& track, const Template& form,
     behind_deg += kind.rounding == Rounding::kCutMean && move != 0
                       ? -Direction(move) * std::min(step_deg / 2, std::abs(move))
                       : std::trunc(move / step_deg) * step_deg - move;
-    const bool down = kind.rounding == Rounding::kDown;
-    const double steps = down ? std::floor(q / step_deg) : std::round(q / step_deg);
-    const double error = IsCut(kind) ? behind_deg : steps * step_deg - q;
+    const double error =
+        IsCut(kind) ? behind_deg : WholeSteps(kind.rounding, q / step_deg) * step_deg - q;
     errors->angle_deg[axis][i] += amplitude[0] * error;
   }
 }
@@ -111,7 +118,7 @@ Effect MakeCommandQuantisation() {
           .owner = Owner::kUnit,
           .needs = {},
           .paragraph =
-              "The command is rounded (or cut, or rounded down) to a step of the controller, so "
+              "The command is rounded, rounded down or cut to a step of the controller, so "
               "that the error is a saw-tooth of the command. It adds up if each move is rounded "
               "by itself.",
           .list = ListCommandQuantisation,

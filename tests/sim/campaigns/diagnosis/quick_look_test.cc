@@ -18,8 +18,12 @@ using test::StaticFit;
 using test::TurnTheta;
 using test::Verdicts;
 
+double Nearest(double steps) { return std::round(steps); }
+double TowardsZero(double steps) { return std::trunc(steps); }
+
 // Theta commands of these units rounded, each to a step of its own.
-Campaign Rounded(const std::map<std::size_t, double>& step_deg, std::uint64_t seed) {
+Campaign Rounded(const std::map<std::size_t, double>& step_deg, std::uint64_t seed,
+                 double (*whole)(double) = Nearest) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = seed});
   std::vector<double> step_of_row(campaign.rows(), 0);
   for (const auto& [unit, step] : step_deg)
@@ -28,7 +32,7 @@ Campaign Rounded(const std::map<std::size_t, double>& step_deg, std::uint64_t se
   TurnTheta(
       [&](std::size_t row) {
         const double commanded = campaign.cmd_deg[kTheta][row], step = step_of_row[row];
-        return step == 0 ? 0 : std::round(commanded / step) * step - commanded;
+        return step == 0 ? 0 : whole(commanded / step) * step - commanded;
       },
       &campaign);
   return campaign;
@@ -63,6 +67,17 @@ TEST(QuickLook, SeesAnyStepOfAllUnitsByItsPeriod) {
   const Templates worth = Worth(campaign);
   ASSERT_FALSE(worth.empty());
   EXPECT_NEAR(worth[0].shape, kStep_deg, 1e-5);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "command_quantisation");
+  EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Reported(diagnosis);
+}
+
+TEST(QuickLook, SeesAnyStepThatIsCutTowardsZero) {
+  std::map<std::size_t, double> all;
+  for (std::size_t unit = 0; unit < 24; ++unit) all[unit] = 0.2194580153;
+  const Campaign campaign = Rounded(all, 5, TowardsZero);
+  ASSERT_LT(std::ranges::min(campaign.cmd_deg[kTheta]), 0) << "cutting is not rounding down";
   const Diagnosis diagnosis = Verdicts(campaign);
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
   EXPECT_EQ(diagnosis.causes[0].cause, "command_quantisation");
