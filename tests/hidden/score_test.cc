@@ -231,5 +231,26 @@ TEST(HiddenScore, RequirementsAreMetOrNot) {
     EXPECT_FALSE(ParseRequirement(text).has_value()) << text;
 }
 
+// Two names of 0.9 of which one is right, and their rivals of 0.1 of which one is right.
+TEST(HiddenScore, StatedProbabilitiesAreComparedWithWhatIsRight) {
+  const auto named = [](const std::string& first, const std::string& second) {
+    Json cause = Cause(first, {first, second});
+    cause["posterior"] = {{first, 0.9}, {second, 0.1}};
+    return cause;
+  };
+  const Json key = KeyOf("single", {Effect("backlash", 300)});
+  Json geometry = Cause("zero_offset");
+  geometry["posterior"] = {{"zero_offset", 1.0}};
+  const Score score =
+      ScoreCases({CaseOf(key, ReportOf("ambiguous", {named("backlash", "stiction"), geometry})),
+                  CaseOf(key, ReportOf("ambiguous", {named("stiction", "backlash")}))});
+  EXPECT_EQ(score.reliability[9].count, 2) << "0.9, without the geometry";
+  EXPECT_EQ(score.reliability[9].right, 1);
+  EXPECT_EQ(score.reliability[1].count, 2);
+  EXPECT_EQ(score.reliability[1].right, 1);
+  EXPECT_NEAR(score.reliability[9].stated(), 0.9, 1e-12);
+  EXPECT_NEAR(Of(score, "calibration_error").value, 0.4, 1e-12);
+}
+
 }  // namespace
 }  // namespace focalfleet::hidden

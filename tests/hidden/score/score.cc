@@ -281,6 +281,7 @@ std::vector<Figure> Figures(const Tally& t) {
       t.ShareFigure("unknown_flagged_weak", "outside, lambda < 250: flagged", ""),
       t.ShareFigure("unknown_misnamed_weak", "outside, lambda < 250: misnamed", ""),
       t.ShareFigure("foreign_degenerate_sure", "outside, a cause looks the same: sure", ""),
+      t.MeanFigure("calibration_error", "stated probabilities to shares that are right", "<=0.05"),
       t.RatioFigure("gain_single", "held-out gain to the oracle's, one cause", ">=0.95"),
       t.MedianFigure("gain_single_median", "the same, median of campaigns", ""),
       t.RatioFigure("gain_composite", "held-out gain to the oracle's, composites", ">=0.9"),
@@ -333,6 +334,8 @@ Score ScoreCases(const std::vector<Case>& cases) {
     if (c.kind == "single" && c.effects.size() == 1) CountSingle(c, &tally, &score.confusion);
     if (c.kind == "unknown" && c.effects.size() == 1) CountForeign(c, &tally);
   }
+  score.reliability = ReliabilityOf(cases);
+  tally.Value("calibration_error", CalibrationError(score.reliability));
   score.figures = Figures(tally);
   return score;
 }

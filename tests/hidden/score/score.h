@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/hidden/score/intervals.h"
+#include "tests/hidden/score/reliability.h"
 #include "tests/hidden/score/verdicts.h"
 
 namespace focalfleet::hidden {
@@ -29,6 +30,7 @@ using Confusion = std::map<std::string, std::map<std::string, int>>;
 struct Score {
   std::vector<Figure> figures;
   Confusion confusion;
+  Reliability reliability{};
   std::vector<std::string> worst;  // campaigns with wrong and unambiguous names
 };
 

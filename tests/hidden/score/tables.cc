@@ -73,6 +73,7 @@ std::string TablesOf(const Score& score) {
       text += " " + (name == cause ? "right" : name) + " " + std::to_string(count) + ",";
     text.back() = '\n';
   }
+  text += "\nreliability of the stated probabilities, by ten bins\n" + TableOf(score.reliability);
   if (!score.worst.empty()) text += "\nwrong and sure\n";
   for (const std::string& line : score.worst) text += "  " + line + "\n";
   return text;
@@ -96,6 +97,10 @@ std::string JsonOf(const Score& score) {
     out["figures"].push_back(figure);
   }
   out["confusion"] = score.confusion;
+  out["reliability"] = nlohmann::ordered_json::array();
+  for (const ReliabilityBin& bin : score.reliability)
+    out["reliability"].push_back(
+        {{"stated", bin.stated()}, {"right", bin.right}, {"count", bin.count}});
   out["wrong_and_sure"] = score.worst;
   return out.dump(1) + "\n";
 }

@@ -64,6 +64,9 @@ NamedCause ReadNamed(const Json& json) {
   named.cause = Text(json, "cause");
   named.candidates = Words(json, "candidates");
   named.candidates.insert(named.cause);
+  if (const auto posterior = json.find("posterior"); posterior != json.end())
+    for (const auto& [cause, probability] : posterior->items())
+      if (probability.is_number()) named.posterior[cause] = probability.get<double>();
   named.axis = Text(json, "axis");
   named.scope = Text(json, "scope");
   named.units = Units(json);

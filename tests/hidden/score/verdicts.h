@@ -2,6 +2,7 @@
 // is missing, or is none, is an empty verdict: it counts as such everywhere.
 #pragma once
 
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -33,6 +34,7 @@ struct TrueEffect {
 struct NamedCause {
   std::string cause;
   std::set<std::string> candidates;  // `cause` among them
+  std::map<std::string, double> posterior;
   std::string axis;
   std::string scope;
   std::set<int> units;  // empty: all
