@@ -8,7 +8,7 @@ namespace focalfleet::sim {
 namespace {
 
 void ListHardStop(const CampaignFacts&, Templates* out) {
-  const std::vector<double> begins_deg = {1, 2, 4, 7, 10, 13, 16, 20};
+  const std::vector<double> begins_deg = {1, 2, 4, 7, 10, 13, 16, 20, 25, 32, 40};
   ListGrid({.shapes = begins_deg, .shape_name = "upper end; begins before it by, deg,"}, out);
   ListGrid({.shapes = begins_deg, .shape_name = "lower end; begins before it by, deg,", .form = 1},
            out);
@@ -50,6 +50,8 @@ Effect MakeHardStop() {
           .apply = ApplyHardStop,
           .of_poses_alone = EachForm,
           .continuous_shape = true,
+          .amplitude_low = 0,  // a stop holds an axis back, and never pulls
+          .amplitude_high = 1.5,
           .traits = {.families = {Family::kAngles}}};
 }
 
