@@ -34,8 +34,13 @@ std::string UnitsOf(const sim::CauseFound& cause) {
 
 /// How far the name is to be trusted: its probability, those of its rivals, and what is excluded.
 std::string ReliabilityOf(const sim::CauseFound& cause) {
-  if (cause.candidates.size() < 2) return "no other cause of the library does this";
   const std::vector<double> posterior = sim::PosteriorOf(cause);
+  if (cause.candidates.size() < 2) {
+    const std::string alone = "no other cause of the library does this";
+    return cause.doubt > 0
+               ? alone + "; such names are right in " + PercentOf(posterior.front()) + " of cases"
+               : alone;
+  }
   std::string text = PercentOf(posterior.front());
   for (std::size_t k = 1; k < cause.candidates.size(); ++k)
     text += fmt::format("; {} {}", WordsFor(cause.candidates[k]).name, PercentOf(posterior[k]));

@@ -42,6 +42,7 @@ struct CauseFound {
   bool at_bound = false;  // the amplitude is as large as physics allows
   // Log odds of candidates against the cause, 0 where the data say nothing of it.
   std::map<std::string, double> log_odds;
+  double doubt = 0;    // probability that none of the candidates is the cause
   double size_um = 0;  // rms at the fibre
   double delta_log_likelihood = 0;
   // delta_log_likelihood of each unit, by unit id, in proportion to the squares of what the cause
@@ -52,7 +53,7 @@ struct CauseFound {
   std::string paragraph;  // for the operator
 };
 
-/// The probability of each candidate, given that the cause is one of them. Shape: (candidates).
+/// The probability of each candidate; the rest of 1 is the cause's doubt. Shape: (candidates).
 std::vector<double> PosteriorOf(const CauseFound& cause);
 
 /// A cause by its name, which is its only candidate so far.

@@ -53,8 +53,10 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   cause.amplitude_unit = effect.amplitude_unit;
   const AmplitudeSummary amplitude = Summarise(term);
   cause.amplitude = amplitude.value;
-  cause.ci95[0] = amplitude.value - 1.96 * amplitude.sigma;
-  cause.ci95[1] = amplitude.value + 1.96 * amplitude.sigma;
+  // An amplitude is no better known than the shape that it belongs to.
+  const double sigma = std::hypot(amplitude.sigma, effect.discrepancy * amplitude.value);
+  cause.ci95[0] = amplitude.value - 1.96 * sigma;
+  cause.ci95[1] = amplitude.value + 1.96 * sigma;
   const auto [low, high] = RangeOfAmplitude(effect);
   cause.at_bound = std::ranges::any_of(
       term.amplitude, [&](double one) { return (low < 0 && one <= low) || one >= high; });

@@ -115,6 +115,10 @@ struct Effect {
   // The shape is an amplitude too: a play of two degrees loses two degrees, and both agree within a
   // factor of five. Shape 0 stands for any that is below all moves.
   bool amplitude_is_shape = false;
+  // How much the effect of a real part differs from this shape, as a share of its amplitude (one
+  // sigma). Sizes found in other authors' plants scatter so much about the planted ones; half of it
+  // leaves their intervals as they are without it, twice as much covers one more of 29.
+  double discrepancy = 0.08;
   // Whether the moves can distinguish this shape. nullptr: any moves can.
   bool (*shows)(const Template&, const CampaignFacts&) = nullptr;
   // Causes whose trace this one may pass for where one of `needs` is missing from the campaign.

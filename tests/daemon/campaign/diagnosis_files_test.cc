@@ -37,6 +37,14 @@ TEST(ReportJson, SharesAProbabilityOutAmongTheCandidates) {
   EXPECT_EQ(posterior["stiction"], 0.0);
 }
 
+TEST(ReportJson, LeavesADoubtThatNoCandidateIsRight) {
+  sim::CauseFound cause = sim::CauseNamed("backlash");
+  cause.doubt = 0.25;
+  EXPECT_EQ(CauseOf(WithCause(cause))["posterior"], json::object({{"backlash", 0.75}}));
+  cause.candidates = {"backlash", "friction_windup"};
+  EXPECT_NEAR(CauseOf(WithCause(cause))["posterior"]["friction_windup"], 0.375, 1e-12);
+}
+
 TEST(ReportJson, SaysWhereAnAmplitudeMeetsItsBound) {
   sim::CauseFound cause = sim::CauseNamed("gear_scale");
   EXPECT_EQ(CauseOf(WithCause(cause))["at_bound"], false);

@@ -70,7 +70,7 @@ TEST(Distortion, AWeakCauseBesideAStrongOneIsKept) {
 
 // The stop's angle in one unit is twice the angle by which the torque turns them all.
 TEST(Distortion, WhatIsLargerThanTheStrongOneIsNotWhatItsShapeLeaves) {
-  for (const auto& [form, size] : {std::pair(11, 0.05), {13, 0.02}}) {
+  for (const auto& [form, size] : {std::pair(14, 0.05), {16, 0.02}}) {
     const Diagnosis diagnosis =
         Verdicts(Planted({{.cause = "fibre_torque", .amplitude = 0.06, .axis = "phi"},
                           {.cause = "hard_stop",
