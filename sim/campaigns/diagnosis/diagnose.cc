@@ -23,13 +23,11 @@
 #include "sim/campaigns/diagnosis/outliers.h"
 #include "sim/campaigns/diagnosis/patch.h"
 #include "sim/campaigns/diagnosis/plain_geometry.h"
-#include "sim/campaigns/diagnosis/polished.h"
 #include "sim/campaigns/diagnosis/remarks.h"
 #include "sim/campaigns/diagnosis/rotor_phases.h"
 #include "sim/campaigns/diagnosis/rotors.h"
 #include "sim/campaigns/diagnosis/screen.h"
 #include "sim/campaigns/diagnosis/shared_walk.h"
-#include "sim/campaigns/diagnosis/steps_instead.h"
 #include "sim/campaigns/diagnosis/wrong_sensors.h"
 #include "sim/campaigns/effects/other_causes.h"
 
@@ -210,20 +208,11 @@ void ReportClusters(const Fit& fit, std::vector<std::size_t> far, const Diagnose
   if (cluster) AddUnknown({std::move(cluster->reported)}, &diagnosis->unknown);
 }
 
-// Rivals that only the likelihood excludes are candidates where the model leaves something
-// unexplained: a likelihood decides nothing there.
-void AddRivalsBehind(std::vector<CauseFound>* causes) {
-  for (CauseFound& cause : *causes)
-    for (const std::string& name : cause.behind)
-      if (std::ranges::find(cause.candidates, name) == cause.candidates.end())
-        cause.candidates.push_back(name);
-}
-
 // The share of names with a probability of 1 among the library's causes that are wrong all the
 // same, in campaigns of three generators (docs/diagnosis.md). Half or double of them moves the mean
 // distance of stated and right by less than 0.03. Geometry has no rivals, and was never wrong.
 double DoubtOf(const CauseFound& cause, bool beside_unknown) {
-  constexpr double kElse = 0.03, kBesideUnknown = 0.4;
+  constexpr double kElse = 0.03, kBesideUnknown = 0.45;
   if (TraitsOf(cause.cause).is_static) return 0;
   return beside_unknown ? kBesideUnknown : kElse;
 }
@@ -383,19 +372,15 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     std::erase_if(templates, [&](const Template& form) { return !IsOffered(form, truth->facts); });
   Selection selection = FindModel(templates, options, rule, truth.get(), &fit, &diagnosis);
   DropBeaten(options.family_wise, options.seed, &fit, &selection);
-  DropNeedlessSteps(&fit);
-  CompareWithSteps(fit, options.family_wise, &selection);
   const RotorCauses rotors = SettleRotors(templates, rule, options.leave_out, &fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
-  ReassessWithoutMisfitArtefacts(templates, rule, fit, &diagnosis.causes);
   JudgeRotors(fit.model, options.leave_out, rotors, &diagnosis.causes);
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
   LookAtRest(options, &fit, &diagnosis);
   ReportClusters(fit, FindAfterFit(fit, &diagnosis.outliers), options, &diagnosis);
   JudgeBesideUnknown(&diagnosis.causes, &diagnosis.unknown);
-  if (!diagnosis.unknown.empty()) AddRivalsBehind(&diagnosis.causes);
   Conclude(&diagnosis);
   ProposeNextMoves(fit, as_named, options, &diagnosis);
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;

@@ -25,9 +25,6 @@ namespace focalfleet::sim {
 struct CauseFound {
   std::string cause;
   std::vector<std::string> candidates;  // the cause itself first
-  // Rivals that leave nearly the same trace and are behind by the likelihood alone. A likelihood
-  // decides nothing where the model leaves something unexplained.
-  std::vector<std::string> behind;
   // Names that these data exclude, whatever else may be unexplained.
   std::vector<std::string> cannot_be;
   // Causes or columns that the misfit of its shape looks like.

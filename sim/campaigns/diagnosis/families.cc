@@ -248,64 +248,6 @@ void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unkn
   *causes = std::move(kept);
 }
 
-void JudgeStrays(const Fit& fit, std::vector<CauseFound>* causes, OutliersFound* outliers) {
-  constexpr std::size_t kUnitsMax = 4,
-                        kOneIn = 5;         // otherwise too few others are left to compare with
-  constexpr double kFar = 20, kLeft = 0.3;  // of noise; of the cause's size
-  const Campaign& campaign = *fit.facts->campaign;
-  std::map<std::uint32_t, std::size_t> index_of;
-  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
-    index_of[campaign.units[unit].id] = unit;
-  // Median of the unit's rows.
-  const auto left_um = [&](std::uint32_t id) {
-    std::vector<double> left;
-    const std::size_t unit = index_of.at(id);
-    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
-      if (fit.aside[row] == 0 && std::isfinite(fit.x_um[row]))
-        left.push_back(std::hypot(fit.x_um[row], fit.y_um[row]));
-    return left.empty() ? 0 : Median(std::move(left));
-  };
-  std::set<std::uint32_t> strays;
-  std::erase_if(*causes, [&](const CauseFound& cause) {
-    if (IsFoundElsewhere(cause) && !TraitsOf(cause.cause).is_static) return false;
-    if (cause.scope != "unit" || cause.units.empty() || cause.units.size() > kUnitsMax ||
-        cause.units.size() * kOneIn > campaign.units.size() ||
-        cause.size_um < kFar * fit.noise.typical_um)
-      return false;
-    if (!std::ranges::all_of(cause.units,
-                             [&](std::uint32_t id) { return left_um(id) > kLeft * cause.size_um; }))
-      return false;
-    strays.insert(cause.units.begin(), cause.units.end());
-    return true;
-  });
-  for (const std::uint32_t unit : strays)
-    if (std::ranges::find(outliers->units, unit) == outliers->units.end())
-      outliers->units.push_back(unit);
-}
-
-void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFound* outliers,
-                std::vector<UnknownFound>* unknown) {
-  constexpr std::size_t kUnitsMin = 4, kNamesMin = 3;
-  if (units < kUnitsMin) return;
-  std::map<std::uint32_t, std::size_t> names;
-  std::map<std::uint32_t, double> square;
-  const auto of_one = [&](const CauseFound& cause) {
-    return !cause.all_units && cause.units.size() == 1 && !IsFoundElsewhere(cause);
-  };
-  for (const CauseFound& cause : *causes)
-    if (of_one(cause))
-      ++names[cause.units[0]], square[cause.units[0]] += std::pow(cause.size_um, 2);
-  for (const auto& [unit, count] : names) {
-    if (count < kNamesMin) continue;
-    const std::uint32_t own = unit;
-    std::erase_if(*causes,
-                  [&](const CauseFound& cause) { return of_one(cause) && cause.units[0] == own; });
-    outliers->units.push_back(unit);
-    unknown->push_back({"unit_id", "unit " + std::to_string(unit) + " by many causes at once", 0,
-                        std::sqrt(square[unit])});
-  }
-}
-
 void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,
                  const RotorCauses& reported, std::vector<CauseFound>* causes) {
   // In 1200 hidden campaigns the sure names below 15 were right; later one at 14.95 was not.

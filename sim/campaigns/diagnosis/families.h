@@ -47,15 +47,6 @@ bool IsReportedAsMisfitArtefact(const UnknownFound& left, std::string_view looks
 /// any axis. Pre: strongest first. `units`: of the campaign.
 void JudgeMisfitArtefacts(std::size_t units, std::vector<CauseFound>* causes);
 
-/// Makes single units outliers whose behaviour is that of no cause. A cause moves them by far more
-/// than noise, and leaves their rows nearly as far off.
-void JudgeStrays(const Fit& fit, std::vector<CauseFound>* causes, OutliersFound* outliers);
-
-/// Makes a unit an outlier that would need three causes of its own or more. Its behaviour is that
-/// of none of them, and becomes unknown.
-void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFound* outliers,
-                std::vector<UnknownFound>* unknown);
-
 /// Removes names that half of the library could have. A weak misfit artefact of a strong cause
 /// goes; any other becomes unknown. A broken tooth that many units have and none shows becomes
 /// unknown, too. Pre: strongest first.

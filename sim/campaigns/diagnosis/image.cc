@@ -383,7 +383,7 @@ void AddDriftAsRival(double drift_um, const Fit& fit, Selection* selection) {
     const ModelTerm& term = fit.model.terms[t];
     if (term.form.effect->traits.image_motion != MotionOfImage::kNone &&
         2 * drift_um > SizeOf(fit, term))
-      selection->accepted[t].rivals.push_back({kCameraSimilarity, 0, 0, false});
+      selection->accepted[t].rivals.push_back({kCameraSimilarity, 0, 0, 0});
   }
 }
 

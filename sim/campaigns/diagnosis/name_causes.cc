@@ -6,7 +6,6 @@
 #include <set>
 
 #include "protocol/base/units.h"
-#include "sim/campaigns/diagnosis/distortion.h"
 #include "sim/campaigns/diagnosis/events.h"
 #include "sim/campaigns/diagnosis/families.h"
 #include "sim/campaigns/diagnosis/find_model.h"
@@ -34,7 +33,7 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   const Effect& effect = *term.form.effect;
   CauseFound cause = CauseNamed(effect.cause);
   for (const Rival& rival : accepted.rivals) {
-    (rival.behind_by_likelihood ? cause.behind : cause.candidates).emplace_back(rival.cause);
+    cause.candidates.emplace_back(rival.cause);
     cause.log_odds[std::string(rival.cause)] = std::min(rival.log_odds, 0.0);
   }
   cause.axis = Name(term.form.axis);
@@ -120,38 +119,6 @@ void MergeCauses(std::vector<CauseFound>* causes) {
   *causes = std::move(merged);
 }
 
-// The causes of the model's terms. A term that a distortion of a stronger one explains as well is
-// reported as a misfit of that one's shape. A term that it explains in part has the stronger one as
-// a candidate.
-std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& accepted) {
-  const std::vector<Undistorted> beside = BesideDistortions(fit, accepted);
-  const double rms_um = RmsOf(fit);
-  std::vector<CauseFound> all, kept;
-  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
-    all.push_back(CauseOf(fit, fit.model.terms[t], accepted[t], rms_um));
-  std::vector<char> is_misfit_artefact;
-  for (std::size_t t = 0; t < all.size(); ++t)
-    is_misfit_artefact.push_back(beside[t].is_misfit_artefact() &&
-                                 CanLeave(all[beside[t].of], all[t]));
-  // The term that a misfit artefact belongs to may be one itself: `of` is stronger each time, so
-  // that the loop ends.
-  const auto named = [&](std::size_t of) {
-    while (is_misfit_artefact[of] != 0) of = beside[of].of;
-    return of;
-  };
-  for (std::size_t t = 0; t < all.size(); ++t) {
-    if (!beside[t].is_doubtful()) continue;
-    CauseFound& strong = all[named(beside[t].of)];
-    if (is_misfit_artefact[t] != 0)
-      ReportAsMisfitArtefact(all[t].size_um, all[t].cause, &strong);
-    else if (std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
-      all[t].candidates.push_back(strong.cause);
-  }
-  for (std::size_t t = 0; t < all.size(); ++t)
-    if (is_misfit_artefact[t] == 0) kept.push_back(std::move(all[t]));
-  return kept;
-}
-
 }  // namespace
 
 void AddUnits(const CauseFound& more, CauseFound* cause) {
@@ -167,14 +134,14 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   for (CauseFound& cause : EventCauses(fit))
     if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
   for (UnknownFound& step : UnexplainedSteps(fit)) diagnosis->unknown.push_back(std::move(step));
-  for (CauseFound& cause : TermCauses(fit, selection.accepted)) causes.push_back(std::move(cause));
-  options.progress(0.8, "geometry against the table");
   const double rms_um = RmsOf(fit);
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
+    causes.push_back(CauseOf(fit, fit.model.terms[t], selection.accepted[t], rms_um));
+  options.progress(0.8, "geometry against the table");
   for (CauseFound& cause : FindGeometryCauses(fit, options.family_wise)) {
     cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
     if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
   }
-  JudgeStrays(fit, &causes, &diagnosis->outliers);
   MergeCauses(&causes);
   // Steps of the image are a misfit of its motion where that follows a column.
   if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
@@ -186,7 +153,6 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   for (UnknownFound& one : nameless)
     if (!IsReportedAsMisfitArtefact(one, one.channel, rms_um, &causes))
       diagnosis->unknown.push_back(std::move(one));
-  JudgeUnits(fit.model.units.size(), &causes, &diagnosis->outliers, &diagnosis->unknown);
   JudgeSeries(&causes, &diagnosis->unknown);
 }
 

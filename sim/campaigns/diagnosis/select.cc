@@ -170,9 +170,9 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
     const double near = std::max(rule.rival_behind, kShapeDoubt * best.chi_square);
     const bool alike = share >= rule.rival_share && !hopeless &&
                        AreTogether(templates[k].effect->owner, best.has, groups);
-    if (behind >= near && !alike) continue;
+    if (behind >= (alike ? kAlike : 1) * near) continue;
     const double log_odds = -behind / 2 * rule.rival_behind / near;
-    const Rival rival{cause, behind, log_odds, share, behind >= kAlike * near};
+    const Rival rival{cause, behind, log_odds, share};
     const auto [it, fresh] = by_cause.emplace(cause, rival);
     if (!fresh && behind < it->second.behind) it->second = rival;
   }
@@ -205,7 +205,7 @@ void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetG
     if ((std::min(trial.behind, trial.behind_by_likelihood) < rule.rival_behind ||
          trial.beyond_chance) &&
         std::ranges::find(*rivals, trial.cause, &Rival::cause) == rivals->end())
-      rivals->push_back({trial.cause, trial.behind, -trial.behind / 2, 0, false});
+      rivals->push_back({trial.cause, trial.behind, -trial.behind / 2, 0});
 }
 
 // Looks at each term once: exchanges it, drops it, or keeps its rivals. True if anything changed.

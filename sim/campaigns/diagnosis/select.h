@@ -16,10 +16,9 @@ namespace focalfleet::sim {
 
 struct Rival {
   std::string_view cause;
-  double behind = 0;                  // twice the difference of the log evidence
-  double log_odds = 0;                // against the term's own cause, with the doubt of its shape
-  double share = 0;                   // of the term's own signal that the rival can take over
-  bool behind_by_likelihood = false;  // leaves the same trace, and only its small misfit decides
+  double behind = 0;    // twice the difference of the log evidence
+  double log_odds = 0;  // against the term's own cause, with the doubt of its shape
+  double share = 0;     // of the term's own signal that the rival can take over
 };
 
 struct Accepted {

@@ -245,41 +245,6 @@ TEST(Families, ABrokenToothShowsInItsUnit) {
   EXPECT_TRUE(unknown.empty());
 }
 
-TEST(Families, AUnitThatACauseMovesFarAndDoesNotExplainIsAnOutlier) {
-  Campaign campaign;
-  campaign.units.resize(6);
-  for (std::uint32_t unit = 0; unit < 6; ++unit) campaign.units[unit].id = 32 + unit;
-  campaign.first_row = {0, 100, 200, 300, 400, 500, 600};
-  CampaignFacts facts;
-  facts.campaign = &campaign;
-  Fit fit;
-  fit.facts = &facts;
-  fit.noise.typical_um = 3;
-  fit.aside.assign(600, 0), fit.x_um.assign(600, 0), fit.y_um.assign(600, 2);
-  OutliersFound outliers;
-  // Unit 37 is off by `left_um` after the fit.
-  const auto judged = [&](const char* name, double size_um, double left_um,
-                          std::vector<std::uint32_t> units, const char* scope = "unit") {
-    std::vector<CauseFound> causes = {Cause(name, "phi", 23)};
-    causes[0].size_um = size_um, causes[0].units = std::move(units), causes[0].scope = scope;
-    std::fill(fit.x_um.begin() + 500, fit.x_um.end(), left_um);
-    outliers.units.clear();
-    JudgeStrays(fit, &causes, &outliers);
-    return causes.size();
-  };
-  EXPECT_EQ(judged("scale_asymmetry", 6000, 4000, {37}), 0u);
-  EXPECT_THAT(outliers.units, ElementsAre(37u));
-  EXPECT_EQ(judged("zero_offset", 6000, 4000, {37}), 0u);
-  // No stray is a unit that the cause puts right, if not to the last micrometre, or one that is no
-  // larger than some noise. The same holds for a cause found by exact places, or of a rail.
-  EXPECT_EQ(judged("gear_scale", 6000, 100, {37}), 1u);
-  EXPECT_EQ(judged("scale_asymmetry", 40, 30, {37}), 1u);
-  EXPECT_EQ(judged("lost_command", 6000, 4000, {37}), 1u);
-  EXPECT_EQ(judged("gear_scale", 6000, 4000, {36, 37}), 1u);  // of six
-  EXPECT_EQ(judged("supply_droop", 6000, 4000, {37}, "rail"), 1u);
-  EXPECT_TRUE(outliers.units.empty());
-}
-
 TEST(Families, WhatIsFaintBesideAMovingImageMayBeTheImages) {
   std::vector<CauseFound> causes = {Cause("camera_similarity", "none", 7000),
                                     Cause("self_heating", "both", 160),
@@ -351,22 +316,6 @@ TEST(Families, WhatNearlyTheSameUnitsHaveBesideIsNotSure) {
   EXPECT_EQ(judged({1, 2, 3, 4, 9}), 2u);
   EXPECT_EQ(judged({1, 2, 3, 8, 9}), 1u);
   EXPECT_EQ(judged({1, 2, 3, 4, 9}, 9), 1u);  // six units have the other: by accident
-}
-
-TEST(Families, AUnitWithManyCausesIsNamedAsAUnit) {
-  std::vector<CauseFound> causes = {Cause("backlash", "theta", 1000)};
-  for (const char* name : {"ramp_travel", "fibre_torque", "command_quantisation", "zero_offset"}) {
-    causes.push_back(Cause(name, "theta", 40));
-    causes.back().all_units = false;
-    causes.back().units = {3};
-  }
-  OutliersFound outliers;
-  std::vector<UnknownFound> unknown;
-  JudgeUnits(20, &causes, &outliers, &unknown);
-  ASSERT_THAT(causes, SizeIs(2));  // and the unit's zero
-  EXPECT_EQ(causes[1].cause, "zero_offset");
-  EXPECT_THAT(outliers.units, ElementsAre(3u));
-  EXPECT_THAT(unknown, SizeIs(1));
 }
 
 TEST(Families, WhoCannotBeTestedIsACandidateBesideItsLikeOverTheNight) {
