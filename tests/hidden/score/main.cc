@@ -17,15 +17,18 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kHelp =
-    "hidden_score --keys DIR --reports DIR [--json FILE] [--require FIGURE>=NUMBER]...\n"
-    "             [--by-interval]\n"
-    "  keys/NAME/key.json is held against reports/NAME/report.json. Ends with 1 where a required\n"
-    "  figure is not met; --by-interval: where even the near end of its 95 % interval does not.\n";
+    "hidden_score {--keys DIR --reports DIR}... [--json FILE] [--picture FILE]\n"
+    "             [--require FIGURE>=NUMBER]... [--by-interval]\n"
+    "  keys/NAME/key.json is held against reports/NAME/report.json; several suites are scored as\n"
+    "  one. --picture draws the reliability of the stated probabilities as SVG. Ends with 1 where\n"
+    "  a required figure is not met; --by-interval: where even the near end of its 95 % interval\n"
+    "  does not.\n";
 
 struct Options {
-  std::string keys;
-  std::string reports;
+  std::vector<std::string> keys;     // of each suite
+  std::vector<std::string> reports;  // Shape: as keys
   std::string json;
+  std::string picture;
   std::vector<Requirement> required;
   bool by_interval = false;
 };
@@ -46,11 +49,13 @@ Result<Options> Parse(int argc, char** argv) {
     if (i + 1 >= argc) return Fail(ErrorCode::kInvalid, kHelp);
     const std::string value = argv[++i];
     if (word == "--keys") {
-      options.keys = value;
+      options.keys.push_back(value);
     } else if (word == "--reports") {
-      options.reports = value;
+      options.reports.push_back(value);
     } else if (word == "--json") {
       options.json = value;
+    } else if (word == "--picture") {
+      options.picture = value;
     } else if (word == "--require") {
       FOCALFLEET_TRY_ASSIGN(Requirement requirement, ParseRequirement(value));
       options.required.push_back(std::move(requirement));
@@ -58,26 +63,41 @@ Result<Options> Parse(int argc, char** argv) {
       return Fail(ErrorCode::kInvalid, kHelp);
     }
   }
-  if (options.keys.empty() || options.reports.empty()) return Fail(ErrorCode::kInvalid, kHelp);
+  if (options.keys.empty() || options.keys.size() != options.reports.size())
+    return Fail(ErrorCode::kInvalid, kHelp);
   return options;
 }
 
-Result<std::vector<Case>> ReadCases(const Options& options) {
+Status ReadSuite(const std::string& keys, const std::string& reports, std::vector<Case>* cases) {
   std::vector<std::string> names;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(options.keys, error))
+  for (const auto& entry : fs::directory_iterator(keys, error))
     if (fs::exists(entry.path() / "key.json")) names.push_back(entry.path().filename().string());
-  if (error) return Fail(ErrorCode::kUnavailable, options.keys + ": " + error.message());
-  if (names.empty()) return Fail(ErrorCode::kInvalid, options.keys + ": no keys in it");
+  if (error) return Fail(ErrorCode::kUnavailable, keys + ": " + error.message());
+  if (names.empty()) return Fail(ErrorCode::kInvalid, keys + ": no keys in it");
   std::sort(names.begin(), names.end());
-  std::vector<Case> cases;
   for (const std::string& name : names) {
-    FOCALFLEET_TRY_ASSIGN(Case one,
-                          ReadCase(name, TextOf(fs::path(options.keys) / name / "key.json"),
-                                   TextOf(fs::path(options.reports) / name / "report.json")));
-    cases.push_back(std::move(one));
+    FOCALFLEET_TRY_ASSIGN(Case one, ReadCase(name, TextOf(fs::path(keys) / name / "key.json"),
+                                             TextOf(fs::path(reports) / name / "report.json")));
+    cases->push_back(std::move(one));
   }
+  return {};
+}
+
+Result<std::vector<Case>> ReadCases(const Options& options) {
+  std::vector<Case> cases;
+  for (std::size_t k = 0; k < options.keys.size(); ++k)
+    FOCALFLEET_TRY(ReadSuite(options.keys[k], options.reports[k], &cases));
   return cases;
+}
+
+bool Write(const std::string& path, const std::string& text) {
+  if (path.empty()) return true;
+  std::ofstream out(path, std::ios::binary);
+  out << text;
+  if (out.flush()) return true;
+  std::fprintf(stderr, "hidden_score: %s: cannot be written\n", path.c_str());
+  return false;
 }
 
 bool Judge(const Options& options, const Score& score) {
@@ -111,14 +131,9 @@ int Main(int argc, char** argv) {
   }
   const Score score = ScoreCases(*cases);
   std::fputs(TablesOf(score).c_str(), stdout);
-  if (!options->json.empty()) {
-    std::ofstream out(options->json, std::ios::binary);
-    out << JsonOf(score);
-    if (!out.flush()) {
-      std::fprintf(stderr, "hidden_score: %s: cannot be written\n", options->json.c_str());
-      return 2;
-    }
-  }
+  if (!Write(options->json, JsonOf(score)) ||
+      !Write(options->picture, PictureOf(score.reliability)))
+    return 2;
   return Judge(*options, score) ? 0 : 1;
 }
 

@@ -17,6 +17,12 @@ bool IsRight(const Case& c, const std::string& cause) {
          });
 }
 
+std::string Tenths(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.1f", value);
+  return text.data();
+}
+
 }  // namespace
 
 Reliability ReliabilityOf(const std::vector<Case>& cases) {
@@ -55,6 +61,45 @@ std::string TableOf(const Reliability& reliability) {
     text += line.data();
   }
   return text;
+}
+
+std::string PictureOf(const Reliability& reliability) {
+  constexpr double kLeft = 60, kTop = 20, kSide = 300;
+  const auto x = [&](double stated) { return kLeft + kSide * stated; };
+  const auto y = [&](double right) { return kTop + kSide * (1 - right); };
+  const auto line = [&](double from_x, double from_y, double to_x, double to_y,
+                        const std::string& colour) {
+    return "<path d=\"M" + Tenths(from_x) + " " + Tenths(from_y) + "L" + Tenths(to_x) + " " +
+           Tenths(to_y) + "\" stroke=\"" + colour + "\"/>\n";
+  };
+  const auto words = [&](double at_x, double at_y, const std::string& anchor,
+                         const std::string& said) {
+    return "<text x=\"" + Tenths(at_x) + "\" y=\"" + Tenths(at_y) + "\" text-anchor=\"" + anchor +
+           "\">" + said + "</text>\n";
+  };
+  std::string text =
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 400 380\" "
+      "font-family=\"sans-serif\" font-size=\"13\" fill=\"#222\">\n"
+      "<rect width=\"400\" height=\"380\" fill=\"#fff\"/>\n";
+  for (const double tick : {0.0, 0.5, 1.0}) {
+    text += line(x(tick), y(0), x(tick), y(1), "#ccc") + line(x(0), y(tick), x(1), y(tick), "#ccc");
+    text += words(x(tick), y(0) + 18, "middle", Tenths(tick));
+    text += words(x(0) - 8, y(tick) + 4, "end", Tenths(tick));
+  }
+  text += line(x(0), y(0), x(1), y(1), "#888");
+  for (const ReliabilityBin& bin : reliability) {
+    if (bin.count == 0) continue;
+    const Interval interval = ClopperPearson(bin.right, bin.count);
+    const double at = x(bin.stated());
+    text += line(at, y(interval.low), at, y(interval.high), "#0b62a4");
+    text += "<circle cx=\"" + Tenths(at) + "\" cy=\"" + Tenths(y(bin.share())) +
+            "\" r=\"4\" fill=\"#0b62a4\"/>\n";
+    text += words(at + 7, y(bin.share()) + 4, "start", std::to_string(bin.count));
+  }
+  text += words(x(0.5), y(0) + 40, "middle", "stated probability");
+  text += "<g transform=\"translate(" + Tenths(x(0) - 38) + " " + Tenths(y(0.5)) +
+          ") rotate(-90)\">" + words(0, 0, "middle", "share that is right") + "</g>\n";
+  return text + "</svg>\n";
 }
 
 }  // namespace focalfleet::hidden

@@ -30,4 +30,7 @@ double CalibrationError(const Reliability& reliability);
 
 std::string TableOf(const Reliability& reliability);
 
+/// An SVG picture: a point a bin with its Clopper-Pearson interval and count, and the diagonal.
+std::string PictureOf(const Reliability& reliability);
+
 }  // namespace focalfleet::hidden
