@@ -6,6 +6,7 @@
 #include <set>
 
 #include "protocol/base/units.h"
+#include "sim/campaigns/diagnosis/distortion.h"
 #include "sim/campaigns/diagnosis/events.h"
 #include "sim/campaigns/diagnosis/families.h"
 #include "sim/campaigns/diagnosis/find_model.h"
@@ -119,6 +120,38 @@ void MergeCauses(std::vector<CauseFound>* causes) {
   *causes = std::move(merged);
 }
 
+// The causes of the model's terms. A term that a distortion of a stronger one explains as well is
+// reported as a misfit of that one's shape. A term that it explains in part has the stronger one as
+// a candidate.
+std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& accepted) {
+  const std::vector<Undistorted> beside = BesideDistortions(fit, accepted);
+  const double rms_um = RmsOf(fit);
+  std::vector<CauseFound> all, kept;
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
+    all.push_back(CauseOf(fit, fit.model.terms[t], accepted[t], rms_um));
+  std::vector<char> is_misfit_artefact;
+  for (std::size_t t = 0; t < all.size(); ++t)
+    is_misfit_artefact.push_back(beside[t].is_misfit_artefact() &&
+                                 CanLeave(all[beside[t].of], all[t]));
+  // The term that a misfit artefact belongs to may be one itself: `of` is stronger each time, so
+  // that the loop ends.
+  const auto named = [&](std::size_t of) {
+    while (is_misfit_artefact[of] != 0) of = beside[of].of;
+    return of;
+  };
+  for (std::size_t t = 0; t < all.size(); ++t) {
+    if (!beside[t].is_doubtful()) continue;
+    CauseFound& strong = all[named(beside[t].of)];
+    if (is_misfit_artefact[t] != 0)
+      ReportAsMisfitArtefact(all[t].size_um, all[t].cause, &strong);
+    else if (std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
+      all[t].candidates.push_back(strong.cause);
+  }
+  for (std::size_t t = 0; t < all.size(); ++t)
+    if (is_misfit_artefact[t] == 0) kept.push_back(std::move(all[t]));
+  return kept;
+}
+
 }  // namespace
 
 void AddUnits(const CauseFound& more, CauseFound* cause) {
@@ -134,10 +167,9 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   for (CauseFound& cause : EventCauses(fit))
     if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
   for (UnknownFound& step : UnexplainedSteps(fit)) diagnosis->unknown.push_back(std::move(step));
-  const double rms_um = RmsOf(fit);
-  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
-    causes.push_back(CauseOf(fit, fit.model.terms[t], selection.accepted[t], rms_um));
+  for (CauseFound& cause : TermCauses(fit, selection.accepted)) causes.push_back(std::move(cause));
   options.progress(0.8, "geometry against the table");
+  const double rms_um = RmsOf(fit);
   for (CauseFound& cause : FindGeometryCauses(fit, options.family_wise)) {
     cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
     if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
