@@ -28,6 +28,17 @@ json JsonOf(const PlaneConfiguration& configuration, const Layout& layout) {
           {"targets", std::move(targets)}};
 }
 
+constexpr ConfigurationState kOverStates[] = {
+    ConfigurationState::kDone, ConfigurationState::kStopped, ConfigurationState::kFailed};
+
+/// None: no state in which a configuration is over.
+std::optional<ConfigurationState> OverStateOf(const json& from) {
+  if (!from.is_string()) return std::nullopt;
+  for (const ConfigurationState state : kOverStates)
+    if (from.get<std::string>() == Name(state)) return state;
+  return std::nullopt;
+}
+
 tl::unexpected<Error> Bad(const std::string& path, const std::string& why) {
   return Fail(ErrorCode::kInvalid, path + ": this is no record of a plane: " + why);
 }
@@ -82,6 +93,13 @@ Result<PlaneRecordFile::Content> Parse(const std::string& text, const std::strin
     FOCALFLEET_TRY_ASSIGN(content.record.under_way,
                           ConfigurationOf(read["under_way"], path, layout));
   }
+  // Records of earlier versions have none.
+  if (read.contains("last") && !read["last"].is_null()) {
+    FOCALFLEET_TRY_ASSIGN(content.record.last, ConfigurationOf(read["last"], path, layout));
+    const auto state = OverStateOf(read["last_state"]);
+    if (!state) return Bad(path, "last_state");
+    content.record.last_state = *state;
+  }
   return content;
 }
 
@@ -107,7 +125,9 @@ Status PlaneRecordFile::Keep(const PlaneRecord& record) const {
   const json written{{"coordinator", content_.coordinator},
                      {"epoch", record.epoch.number},
                      {"next_configuration", record.next_configuration},
-                     {"under_way", record.under_way ? JsonOf(*record.under_way, layout_) : json()}};
+                     {"under_way", record.under_way ? JsonOf(*record.under_way, layout_) : json()},
+                     {"last", record.last ? JsonOf(*record.last, layout_) : json()},
+                     {"last_state", Name(record.last_state)}};
   return WriteFileAtomically(path_, written.dump() + "\n");
 }
 

@@ -1,5 +1,5 @@
-// The file of a plane's coordinator: its number, its epoch, and the configuration under way. The
-// file is replaced as a whole, at most three times a configuration.
+// The file of a plane's coordinator: its number, its epoch, the configuration under way, and the
+// last one that is over. The file is replaced as a whole, at most three times a configuration.
 #pragma once
 
 #include <cstdint>

@@ -12,9 +12,11 @@
 // moving      all sectors that hold the round have the start instant; each moves or gives it back
 // finishing   nothing is left to move: each sector ends the configuration
 //
-// The state is what the sectors report. The coordinator keeps its epoch and the configuration under
-// way, and nothing else, so that a new life of it goes on in any phase: it takes a new epoch, gives
-// back what is held, waits until what moves has ended, and goes on with a new plan.
+// The state is what the sectors report. The coordinator keeps its epoch, the configuration under
+// way and the last one that is over, and nothing else, so that a new life of it goes on in any
+// phase: it takes a new epoch, gives back what is held, waits until what moves has ended, and goes
+// on with a new plan. A sector that begins another life is told of the last configuration, so that
+// it knows what became of its units.
 //
 // Two coordinators. Each sector follows the highest epoch that it has heard. A coordinator that
 // hears of a higher one than its own says nothing more, and takes over again where no sector has
@@ -52,6 +54,9 @@ struct PlaneRecord {
   PlaneEpoch epoch;
   std::uint64_t next_configuration = 1;
   std::optional<PlaneConfiguration> under_way;
+  /// The last one that is over, and how it ended: sectors that begin another life are told of it.
+  std::optional<PlaneConfiguration> last = {};
+  ConfigurationState last_state = ConfigurationState::kDone;
 };
 
 struct PlaneApplyCommand {
@@ -125,6 +130,7 @@ struct PlaneView {
 struct PlanePart {
   std::uint64_t incarnation = 0;
   std::uint64_t job = 0;  // 0: none
+  bool operator==(const PlanePart&) const = default;
 };
 
 class PlaneCoordinator {
@@ -144,6 +150,9 @@ class PlaneCoordinator {
   void Keep();
   void Obey(const PlaneCommand& command);
   Status Apply(std::uint64_t request, const PlaneApplyCommand& command);
+  void Count();
+  void Idle();
+  void Recall(std::uint32_t sector);
   void Listen();
   void Claim();
   void Gather();
@@ -154,6 +163,8 @@ class PlaneCoordinator {
   void GiveRound(PlanePlan plan);
   void Preparing();
   void Start();
+  void Moving();
+  [[nodiscard]] PlaneOrder EndOf(std::uint32_t sector, SectorRound body) const;
   void Finish(const std::string& failure, const PlanePlan* plan);
   void Finishing();
   void Stop(const std::string& why);
@@ -177,6 +188,7 @@ class PlaneCoordinator {
   std::uint64_t request_ = 0;        // that waits for the end; 0: none
   std::uint64_t job_ = 0;            // the last asked for
   std::uint64_t round_ = 0;          // the last given out, in this epoch
+  std::vector<OutcomeCounts> told_;  // Shape: (sectors); last told of the configuration
   std::vector<PlanePart> parts_;     // Shape: (sectors)
   std::vector<std::uint8_t> strip_;  // Shape: (units); of the last job
   ConfigurationState end_ = ConfigurationState::kDone;

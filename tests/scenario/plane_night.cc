@@ -280,8 +280,8 @@ class Night {
     if (!plane_.RunUntil([this] { return plane_.IsIdle(); }, Seconds(400)))
       Broken("the first configuration does not end: " + std::string(Name(*Phase())) +
              ", waits for " + plane_.plane().view().waiting_for);
+    plane_.Run(Seconds(8));  // a sector's next life is told of the configuration
     LookAtFates();
-    plane_.Run(Seconds(8));
     // An operator clears the faults of units.
     for (const PositionerIndex i : halted_) {
       const UnitId id = plane_.layout().layout().unit(i).id;

@@ -183,6 +183,10 @@ TEST_P(PlaneFaultInPhase, KeepsEveryRule) {
               result.struck[static_cast<std::size_t>(fault)][static_cast<std::size_t>(phase)] > 0);
   }
   EXPECT_GT(fates.struck, 0u) << "the fault never struck in this phase";
+  // The units of a sector that was killed have arrived, and its next life says so.
+  if (fault == static_cast<int>(PlaneFault::kKillSector) && phase == PlanePhase::kFinishing) {
+    EXPECT_EQ(TextOf(fates.victims), "all arrived");
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(

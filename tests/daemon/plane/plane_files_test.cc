@@ -46,6 +46,11 @@ TEST(PlaneRecordFile, KeepsTheConfigurationUnderWay) {
   record.under_way->target_ids.resize(20);
   record.under_way->targets[4] = Pose{-100, 2000};
   record.under_way->target_ids[4] = "star";
+  record.last = PlaneConfiguration{.id = 7, .source = "before", .targets = {}};
+  record.last->targets.resize(20);
+  record.last->target_ids.resize(20);
+  record.last->targets[9] = Pose{3, 4};
+  record.last_state = ConfigurationState::kStopped;
   {
     auto file = PlaneRecordFile::Open(path, layout, 1234);
     ASSERT_TRUE(file.has_value()) << file.error().text;
@@ -59,6 +64,8 @@ TEST(PlaneRecordFile, KeepsTheConfigurationUnderWay) {
   EXPECT_EQ((*again)->content().record.epoch, record.epoch);
   EXPECT_EQ((*again)->content().record.next_configuration, 9u);
   EXPECT_EQ((*again)->content().record.under_way, record.under_way);
+  EXPECT_EQ((*again)->content().record.last, record.last);
+  EXPECT_EQ((*again)->content().record.last_state, ConfigurationState::kStopped);
 }
 
 TEST(PlaneRecordFile, RefusesWhatIsNone) {
@@ -76,7 +83,10 @@ TEST(PlaneRecordFile, RefusesWhatIsNone) {
        "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
        "\"s\",\"fixed\":false,\"targets\":[[1,18446744073709551615,1,\"\"]]}}",
        "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
-       "\"s\",\"fixed\":false,\"targets\":[[4294967297,1,1,\"\"]]}}"}) {
+       "\"s\",\"fixed\":false,\"targets\":[[4294967297,1,1,\"\"]]}}",
+       "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"last\":{\"id\":1,\"source\":"
+       "\"s\","
+       "\"fixed\":false,\"targets\":[]},\"last_state\":\"moving\"}"}) {
     const test::ScratchFolder scratch;
     std::ofstream(scratch / "plane.json") << text;
     const auto file = PlaneRecordFile::Open(scratch / "plane.json", layout, 5);

@@ -153,6 +153,53 @@ TEST(PlaneCoordinator, GoesOnWithTheConfigurationOfItsEarlierLife) {
   }
 }
 
+// Units that have arrived are told as arrived by the next life of their sector, too.
+TEST(PlaneCoordinator, TellsANewLifeOfASectorOfTheLastConfiguration) {
+  PlaneRecord kept{.epoch = {3, kSelf}, .next_configuration = 6, .under_way = {}};
+  kept.last = PlaneConfiguration{.id = 5, .source = "test"};
+  kept.last->targets.assign(20, Pose{4, 4});
+  Bench bench(kept);
+  for (SectorReport& report : bench.reports) report.counts.arrived = 10;
+  bench.reports[0].last_over = {kSelf, 5};
+  ASSERT_TRUE(bench.Until(PlanePhase::kIdle));
+  bench.Step(0.3);
+  bench.Step(0.3);
+  EXPECT_EQ(bench.orders[0].kind, OrderKind::kStand);
+  EXPECT_EQ(bench.view().counts.arrived, 10u) << "the other sector has told nothing yet";
+  ASSERT_EQ(bench.orders[1].kind, OrderKind::kConfigure);
+  EXPECT_EQ(bench.orders[1].configuration, (PlaneConfigurationId{kSelf, 5}));
+  // The sector asks; nothing moves, and only what does not stand at its target is refused.
+  SectorReport& report = bench.reports[1];
+  report.configuration = {kSelf, 5};
+  report.stage = SectorStage::kAsking;
+  report.job = 2;
+  SectorJob job{.job = 2};
+  const Pose there{4, 4};
+  job.start.assign(10, Exactly(Witness::kReported, there));
+  job.start[7] = Exactly(Witness::kReported, {4, 5});
+  job.targets.assign(10, there);
+  job.frozen.resize(10);
+  job.offsets.resize(10);
+  job.drives.resize(10);
+  report.body = std::make_shared<const SectorJob>(std::move(job));
+  bench.Step(0.3);
+  ASSERT_EQ(bench.orders[1].kind, OrderKind::kRound);
+  ASSERT_NE(bench.orders[1].round_body, nullptr);
+  const SectorRound& round = *bench.orders[1].round_body;
+  EXPECT_TRUE(round.finished);
+  EXPECT_TRUE(round.moves.empty());
+  ASSERT_EQ(round.refused.size(), 1u);
+  EXPECT_EQ(round.refused[0].unit, PositionerIndex{7});
+  EXPECT_EQ(bench.view().phase, PlanePhase::kIdle);
+  report.configuration = {};
+  report.last_over = {kSelf, 5};
+  report.stage = SectorStage::kIdle;
+  report.counts = {.targeted = 10, .arrived = 9, .refused = 1};
+  bench.Step(0.3);
+  EXPECT_EQ(bench.view().counts.arrived, 19u);
+  EXPECT_EQ(bench.view().counts.refused, 1u);
+}
+
 TEST(PlaneCoordinator, StopsAConfigurationThatItDoesNotKnow) {
   Bench bench;
   bench.reports[1].configuration = {9, 77};
