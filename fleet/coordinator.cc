@@ -170,9 +170,10 @@ class Coordinator::Impl {
     return WriteParameter(fleet_, request, c);
   }
 
-  Status Do(std::uint64_t request, const SectorApplyCommand& c) {
+  Status Do(std::uint64_t request, const SectorTask& c) {
     FOCALFLEET_TRY(OfPlane(true));
-    return executor_.Apply(request, c.apply);
+    if (const auto* home = std::get_if<HomeCommand>(&c.what)) return executor_.Home(request, *home);
+    return executor_.Apply(request, std::get<ApplyCommand>(c.what));
   }
   /// The other commands of a plane.
   template <class OfRound>

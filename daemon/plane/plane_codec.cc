@@ -33,11 +33,25 @@ bool IsGood(const ApplyCommand& apply) {
   });
 }
 
+bool IsGood(const SectorTask& task) {
+  if (const auto* home = std::get_if<HomeCommand>(&task.what))
+    return home->units.size() <= limits::kUnits;
+  return IsGood(std::get<ApplyCommand>(task.what));
+}
+
 bool IsGood(const PlaneOrder& order) {
   return order.sector < limits::kSectors && order.kind <= kLastOrderKind &&
          IsClock(order.start_at) && IsClock(order.sent) &&
          (!order.ahead || IsClock(*order.ahead)) && AreSectors(order.together) &&
-         (order.apply == nullptr || IsGood(*order.apply));
+         order.retargets.size() <= limits::kUnits &&
+         std::ranges::all_of(order.retargets,
+                             [](const SectorRetarget& retarget) {
+                               return std::ranges::all_of(
+                                   retarget.target.pose, [](std::int64_t vectors) {
+                                     return IsWithin(vectors, limits::kPositionMax);
+                                   });
+                             }) &&
+         (order.task == nullptr || IsGood(*order.task));
 }
 
 bool IsGood(const SectorReport& report) {

@@ -14,7 +14,7 @@ namespace focalfleet {
 
 /// Grows whenever a message changes. Sectors are upgraded one at a time only between versions of
 /// the same format.
-inline constexpr std::uint8_t kPlaneFormat = 2;
+inline constexpr std::uint8_t kPlaneFormat = 3;
 
 std::string Encode(const PlaneOrder& order);
 std::string Encode(const SectorReport& report);

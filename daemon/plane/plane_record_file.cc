@@ -1,6 +1,8 @@
 #include "daemon/plane/plane_record_file.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -22,10 +24,19 @@ json JsonOf(const PlaneConfiguration& configuration, const Layout& layout) {
     targets.push_back({layout.units()[n].id.value, pose[0], pose[1],
                        named ? configuration.target_ids[n] : std::string()});
   }
+  json to_home = json::array();
+  for (const PositionerIndex i : configuration.to_home) to_home.push_back(layout.unit(i).id.value);
+  json changes = json::array();
+  for (const auto& [number, i] : configuration.changes)
+    changes.push_back({number, layout.unit(i).id.value});
   return {{"id", configuration.id},
           {"source", configuration.source},
           {"fixed", configuration.fixed},
-          {"targets", std::move(targets)}};
+          {"targets", std::move(targets)},
+          {"kind", Name(configuration.kind)},
+          {"to_home", std::move(to_home)},
+          {"unproven", configuration.unproven},
+          {"changes", std::move(changes)}};
 }
 
 constexpr ConfigurationState kOverStates[] = {
@@ -51,6 +62,45 @@ std::optional<std::int32_t> VectorsOf(const json& number) {
   return static_cast<std::int32_t>(vectors);
 }
 
+std::optional<PositionerIndex> UnitOf(const json& id, const Layout& layout) {
+  if (!id.is_number_unsigned() || id.get<std::uint64_t>() > UINT32_MAX) return std::nullopt;
+  return layout.Find(UnitId{id.get<std::uint32_t>()});
+}
+
+constexpr ConfigurationKind kKinds[] = {ConfigurationKind::kApply, ConfigurationKind::kHome};
+
+/// Takes the task of a configuration that is more than targets. Records of earlier versions have
+/// none.
+Status TakeTask(const json& from, const std::string& path, const Layout& layout,
+                PlaneConfiguration* configuration) {
+  const json kind = from.value("kind", json());
+  if (kind.is_null()) return {};
+  const auto known = std::ranges::find_if(
+      kKinds, [&](ConfigurationKind one) { return kind.is_string() && kind == Name(one); });
+  const json unproven = from.value("unproven", json(false));
+  const json to_home = from.value("to_home", json::array());
+  const json changes = from.value("changes", json::array());
+  if (known == std::end(kKinds) || !unproven.is_boolean() || !to_home.is_array() ||
+      !changes.is_array())
+    return Bad(path, "the task of a configuration");
+  configuration->kind = *known;
+  configuration->unproven = unproven.get<bool>();
+  for (const json& id : to_home) {
+    const auto unit = UnitOf(id, layout);
+    if (!unit) return Bad(path, "a unit to home that the units file has not");
+    configuration->to_home.push_back(*unit);
+  }
+  std::ranges::sort(configuration->to_home);
+  for (const json& change : changes) {
+    const auto unit =
+        change.is_array() && change.size() == 2 ? UnitOf(change[1], layout) : std::nullopt;
+    if (!unit || !change[0].is_number_unsigned() || !configuration->targets[unit->value])
+      return Bad(path, "another target of a unit");
+    configuration->changes.emplace(change[0].get<std::uint64_t>(), *unit);
+  }
+  return {};
+}
+
 Result<PlaneConfiguration> ConfigurationOf(const json& from, const std::string& path,
                                            const Layout& layout) {
   const auto has = [&from](const char* key) { return from.is_object() && from.contains(key); };
@@ -67,15 +117,14 @@ Result<PlaneConfiguration> ConfigurationOf(const json& from, const std::string& 
     if (!row.is_array() || row.size() != 4 || !row[0].is_number_unsigned() ||
         !row[1].is_number_integer() || !row[2].is_number_integer() || !row[3].is_string())
       return Bad(path, "a target");
-    const auto id = row[0].get<std::uint64_t>();
-    const auto unit = id <= UINT32_MAX ? layout.Find(UnitId{static_cast<std::uint32_t>(id)})
-                                       : std::optional<PositionerIndex>();
+    const auto unit = UnitOf(row[0], layout);
     const std::optional<std::int32_t> theta = VectorsOf(row[1]), phi = VectorsOf(row[2]);
     if (!unit || !theta || !phi)
       return Bad(path, "a target of a unit that the units file has not, or beyond all ranges");
     configuration.targets[unit->value] = Pose{*theta, *phi};
     configuration.target_ids[unit->value] = row[3].get<std::string>();
   }
+  FOCALFLEET_TRY(TakeTask(from, path, layout, &configuration));
   return configuration;
 }
 

@@ -53,11 +53,9 @@ Error RefusalOf(const PlaneInstant& plane, const ControlRequest& request) {
     if (!plane.plane->layout().Find(UnitId{unit}))
       return {ErrorCode::kInvalid, "there is no unit " + std::to_string(unit) + " in the plane"};
   const std::string doors = DoorsOf(plane, units);
-  if (verb == "home" || verb == "measure" || verb == "retarget")
+  if (verb == "measure")
     return {ErrorCode::kRefused,
-            "a plane has no " + verb + " of single units or sectors, because units beyond the " +
-                "border would not know of it: docs/plane.md says how a unit of unknown place is " +
-                "homed. The units are of " + doors};
+            "a plane is not measured: each sector's daemon has the sensors of its own units alone"};
   if (verb == "history")
     return {ErrorCode::kRefused,
             "a plane's coordinator keeps the configuration under way alone; each sector's daemon "

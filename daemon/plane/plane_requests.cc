@@ -5,11 +5,9 @@
 #include <utility>
 
 #include "daemon/access/rights.h"
+#include "daemon/plane/plane_commands.h"
 #include "daemon/plane/plane_refusal.h"
 #include "daemon/usage/build_version.h"
-#include "fleet/files/line_limit.h"
-#include "fleet/files/targets_file.h"
-#include "fleet/targets.h"
 
 namespace focalfleet {
 namespace {
@@ -47,7 +45,7 @@ Json ProgressJson(const PlaneInstant& plane) {
   const PlaneView& view = plane.coordinator->view();
   const OutcomeCounts& counts = view.counts;
   return {{"id", view.configuration},
-          {"kind", "apply"},
+          {"kind", Name(view.kind)},
           {"state", Name(view.state)},
           {"round", view.rounds},
           {"targeted", counts.targeted},
@@ -59,62 +57,6 @@ Json ProgressJson(const PlaneInstant& plane) {
           {"makespan_predicted_s", Number(view.makespan_predicted_s)},
           {"waiting_for", view.waiting_for},
           {"fraction", counts.targeted == 0 ? 0.0 : double(counts.arrived) / counts.targeted}};
-}
-
-/// Places and drives of all units as their sectors last reported them.
-struct Standing {
-  std::vector<UnitKnowledge> places;
-  std::vector<UnitDrive> drives;
-  std::vector<std::uint8_t> known;
-};
-
-Standing StandingOf(const PlaneInstant& plane) {
-  Standing standing;
-  const std::size_t units = plane.plane->layout().size();
-  standing.places.resize(units);
-  standing.drives.resize(units);
-  standing.known.resize(units);
-  for (std::uint32_t n = 0; n < units; ++n) {
-    const SectorBook::Entry& entry = plane.coordinator->sectors()[plane.plane->SectorOf({n})];
-    if (entry.places == nullptr) continue;
-    const std::uint32_t local = plane.plane->Local({n}).value;
-    standing.places[n] = entry.places->places[local];
-    standing.drives[n] = entry.places->drives[local];
-    standing.known[n] = 1;
-  }
-  return standing;
-}
-
-Result<PlaneApplyCommand> ApplyOf(const PlaneInstant& plane, const Json& args) {
-  for (const char* name : {"corrections", "observe"})
-    if (args.contains(name))
-      return Fail(ErrorCode::kRefused,
-                  "a plane is not measured: each sector's daemon has the "
-                  "sensors of its own units alone");
-  PlaneApplyCommand command;
-  FOCALFLEET_TRY_ASSIGN(command.source, TextArgumentOr(args, "source", "targets"));
-  FOCALFLEET_TRY_ASSIGN(command.fixed, FlagArgumentOr(args, "fixed", false));
-  FOCALFLEET_TRY_ASSIGN(const std::string csv,
-                        TextArgument(args, "targets_csv", kControlLineBytesMax));
-  FOCALFLEET_TRY(CheckLines(csv, command.source, std::size_t{2} * limits::kUnits));
-  FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(csv, command.source));
-  const Layout& layout = plane.plane->layout();
-  const Standing standing = StandingOf(plane);
-  command.target_ids.resize(layout.size());
-  for (const TargetRow& row : targets.rows) {
-    const auto i = layout.Find(row.unit);
-    if (!i) continue;  // ResolveTargets names it
-    command.target_ids[i->value] = row.target_id;
-    if (standing.known[i->value] == 0)
-      return Fail(ErrorCode::kRefused,
-                  "unit " + std::to_string(row.unit.value) + " is of " +
-                      NameOfSector(plane.plane->SectorOf(*i)) +
-                      ", which has not been heard since this coordinator started: its units' "
-                      "drives are not known");
-  }
-  FOCALFLEET_TRY_ASSIGN(command.targets,
-                        ResolveTargets(targets, layout, standing.drives, standing.places));
-  return command;
 }
 
 }  // namespace
@@ -199,33 +141,36 @@ void PlaneRequests::Handle(const PlaneInstant& plane, const IncomingLine& line,
   }
   if (verb == "wait") {
     if (!plane.coordinator->busy()) return Answer(pending, Json{{"under_way", false}});
-    pending.wait = pending.apply = true;
+    pending.wait = true;
+    pending.kind = Pending::Kind::kConfiguration;
     pending_.emplace(next_++, pending);
     return;
   }
-  if (verb == "stop") {
-    if (request->args.contains("unit_id")) return refuse(RefusalOf(plane, *request));
-    options_.log("stop commanded by " + Describe(line.caller));
-    commands->push_back({next_, PlaneStopCommand{}});
-    pending_.emplace(next_++, pending);
-    return;
-  }
-  if (verb != "apply") return refuse(RefusalOf(plane, *request));
-  if (line.overtaken)
-    return refuse({ErrorCode::kRefused,
-                   "a stop that came before apply was begun went ahead of it; "
-                   "command it again if it is still wanted"});
+  const bool stops_a_unit = verb == "stop" && request->args.contains("unit_id");
+  if (!IsPlaneCommand(verb) || stops_a_unit) return refuse(RefusalOf(plane, *request));
+  if (line.overtaken && verb != "stop")
+    return refuse({ErrorCode::kRefused, "a stop that came before " + verb +
+                                            " was begun went ahead of it; command it again if it "
+                                            "is still wanted"});
   const auto wait = FlagArgumentOr(request->args, "wait", false);
   if (!wait) return refuse(wait.error());
-  auto apply = ApplyOf(plane, request->args);
-  if (!apply) {
-    options_.log("apply refused: " + apply.error().text);
-    return refuse(apply.error());
+  std::optional<Result<PlaneCommand>> command;
+  options_.read([&](const PlaneTable& table) {
+    PlaneInstant with_table = plane;
+    with_table.table = &table;
+    command = PlaneCommandOf(with_table, *request);
+  });
+  if (!*command) {
+    options_.log(verb + " refused: " + command->error().text);
+    return refuse(command->error());
   }
-  options_.log("apply commanded by " + Describe(line.caller));
-  pending.wait = *wait;
-  pending.apply = true;
-  commands->push_back({next_, std::move(*apply)});
+  options_.log(verb + " commanded by " + Describe(line.caller));
+  pending.kind = verb == "stop"       ? Pending::Kind::kStop
+                 : verb == "retarget" ? Pending::Kind::kRetarget
+                                      : Pending::Kind::kConfiguration;
+  pending.wait = *wait && pending.kind == Pending::Kind::kConfiguration;
+  (*command)->request = next_;
+  commands->push_back(std::move(**command));
   pending_.emplace(next_++, pending);
 }
 
@@ -240,7 +185,9 @@ void PlaneRequests::Reply(const PlaneInstant& plane, const ReplyEffect& reply) {
   const Pending pending = it->second;
   if (reply.error) {
     Answer(pending, tl::unexpected<Error>(*reply.error));
-  } else if (!pending.apply) {
+  } else if (pending.kind == Pending::Kind::kRetarget) {
+    Answer(pending, Json{{"goes", true}, {"text", reply.text}});
+  } else if (pending.kind == Pending::Kind::kStop) {
     Answer(pending, Json{{"text", reply.text}});
   } else if (!pending.wait || reply.last) {
     Answer(pending, PlaneConfigurationJson(plane));

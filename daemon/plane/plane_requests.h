@@ -1,6 +1,6 @@
-// The requests of the control socket of a plane's coordinator: status, apply, stop, wait, access
-// and those about alarms. They are those of a daemon of its own, for the whole plane; all other
-// verbs are a sector's affair and are asked of its own daemon.
+// The requests of the control socket of a plane's coordinator: status, state, wait, access, those
+// about alarms, and commands (plane_commands.h). They are those of a daemon of its own, for the
+// whole plane; all other verbs are a sector's affair and are asked of its own daemon.
 #pragma once
 
 #include <cstdint>
@@ -60,7 +60,7 @@ class PlaneRequests {
     ClientId client = 0;
     std::uint64_t id = 0;
     bool wait = false;
-    bool apply = false;
+    enum class Kind : std::uint8_t { kConfiguration, kRetarget, kStop } kind = Kind::kStop;
   };
   void Handle(const PlaneInstant& plane, const IncomingLine& line,
               std::vector<PlaneCommand>* commands);

@@ -14,26 +14,6 @@
 namespace focalfleet {
 namespace {
 
-/// The units of a request by their numbers, each once. Errors: kInvalid names the first unit that
-/// does not exist.
-Result<std::vector<PositionerIndex>> FindUnits(const Layout& layout,
-                                               const std::vector<std::uint32_t>& ids) {
-  if (ids.empty()) return Fail(ErrorCode::kInvalid, "no unit named");
-  if (ids.size() > layout.size())
-    return Fail(ErrorCode::kInvalid, std::to_string(ids.size()) +
-                                         " units are named, and there are " +
-                                         std::to_string(layout.size()));
-  std::vector<PositionerIndex> units;
-  units.reserve(ids.size());
-  std::vector<std::uint8_t> named(layout.size(), 0);
-  for (const std::uint32_t id : ids) {
-    const auto i = layout.Find(UnitId{id});
-    if (!i) return Fail(ErrorCode::kInvalid, "there is no unit " + std::to_string(id));
-    if (std::exchange(named[i->value], std::uint8_t{1}) == 0) units.push_back(*i);
-  }
-  return units;
-}
-
 Result<Axis> AxisArgument(const Json& args) {
   FOCALFLEET_TRY_ASSIGN(const std::string name, TextArgument(args, "axis"));
   for (const Axis axis : kAxes)
@@ -130,31 +110,14 @@ UnitKnowledge GoesTo(const UnitView& unit) {
 
 Result<RetargetCommand> RetargetOf(const Json& args, const FleetView& view) {
   FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(args, *view.layout));
-  TargetRow row{.unit = view.layout->unit(i).id, .place = {}, .target_id = {}};
-  if (args.contains("theta_deg") || args.contains("phi_deg")) {
-    TargetAngles angles;
-    FOCALFLEET_TRY_ASSIGN(angles.theta_deg, NumberArgument(args, "theta_deg"));
-    FOCALFLEET_TRY_ASSIGN(angles.phi_deg, NumberArgument(args, "phi_deg"));
-    row.place = angles;
-  } else {
-    PointFp place;
-    FOCALFLEET_TRY_ASSIGN(place.x_mm, NumberArgument(args, "x_mm"));
-    FOCALFLEET_TRY_ASSIGN(place.y_mm, NumberArgument(args, "y_mm"));
-    row.place = place;
-  }
   std::vector<UnitKnowledge> now;
   now.reserve(view.layout->size());
   for (std::uint32_t n = 0; n < view.layout->size(); ++n)
     now.push_back(i.value == n ? view.coordinator->KnowledgeAt(i, view.now)
                                : GoesTo(view.coordinator->unit({n})));
-  const auto poses = ResolveTargets({.source = "retarget", .rows = {row}}, *view.layout,
-                                    view.coordinator->drives(), now);
-  if (!poses) {
-    // The error begins with file and line, and a retarget has no file.
-    const std::string& text = poses.error().text;
-    return Fail(poses.error().code, text.substr(text.find(": ") + 2));
-  }
-  return RetargetCommand{i, *(*poses)[i.value]};
+  FOCALFLEET_TRY_ASSIGN(const Pose pose,
+                        TargetArgument(args, i, *view.layout, view.coordinator->drives(), now));
+  return RetargetCommand{i, pose};
 }
 
 /// The units whose place is not known and that can be homed now.
@@ -178,7 +141,7 @@ Result<HomeCommand> HomeOf(const Json& args, const FleetView& view) {
     return command;
   }
   FOCALFLEET_TRY_ASSIGN(const auto ids, UnsignedListArgument(args, "unit_ids"));
-  FOCALFLEET_TRY_ASSIGN(auto units, FindUnits(*view.layout, ids));
+  FOCALFLEET_TRY_ASSIGN(auto units, UnitsArgument(*view.layout, ids));
   return HomeCommand{std::move(units), unproven};
 }
 
@@ -190,7 +153,7 @@ Result<StopCommand> StopOf(const Json& args, const FleetView& view) {
 
 Result<EnableCommand> EnableOf(const Json& args, const FleetView& view, bool enabled) {
   FOCALFLEET_TRY_ASSIGN(const auto ids, UnsignedListArgument(args, "unit_ids"));
-  FOCALFLEET_TRY_ASSIGN(auto units, FindUnits(*view.layout, ids));
+  FOCALFLEET_TRY_ASSIGN(auto units, UnitsArgument(*view.layout, ids));
   EnableCommand command{.units = std::move(units), .enabled = enabled, .reason = {}};
   if (enabled) return command;
   FOCALFLEET_TRY_ASSIGN(command.reason, TextArgument(args, "reason"));
@@ -258,6 +221,46 @@ Result<PositionerIndex> UnitArgument(const Json& args, const Layout& layout) {
   if (id <= std::numeric_limits<std::uint32_t>::max())
     if (const auto i = layout.Find(UnitId{static_cast<std::uint32_t>(id)})) return *i;
   return Fail(ErrorCode::kInvalid, "there is no unit " + std::to_string(id));
+}
+
+Result<std::vector<PositionerIndex>> UnitsArgument(const Layout& layout,
+                                                   const std::vector<std::uint32_t>& ids) {
+  if (ids.empty()) return Fail(ErrorCode::kInvalid, "no unit named");
+  if (ids.size() > layout.size())
+    return Fail(ErrorCode::kInvalid, std::to_string(ids.size()) +
+                                         " units are named, and there are " +
+                                         std::to_string(layout.size()));
+  std::vector<PositionerIndex> units;
+  units.reserve(ids.size());
+  std::vector<std::uint8_t> named(layout.size(), 0);
+  for (const std::uint32_t id : ids) {
+    const auto i = layout.Find(UnitId{id});
+    if (!i) return Fail(ErrorCode::kInvalid, "there is no unit " + std::to_string(id));
+    if (std::exchange(named[i->value], std::uint8_t{1}) == 0) units.push_back(*i);
+  }
+  return units;
+}
+
+Result<Pose> TargetArgument(const Json& args, PositionerIndex i, const Layout& layout,
+                            std::span<const UnitDrive> drives,
+                            std::span<const UnitKnowledge> places) {
+  TargetRow row{.unit = layout.unit(i).id, .place = {}, .target_id = {}};
+  if (args.contains("theta_deg") || args.contains("phi_deg")) {
+    TargetAngles angles;
+    FOCALFLEET_TRY_ASSIGN(angles.theta_deg, NumberArgument(args, "theta_deg"));
+    FOCALFLEET_TRY_ASSIGN(angles.phi_deg, NumberArgument(args, "phi_deg"));
+    row.place = angles;
+  } else {
+    PointFp place;
+    FOCALFLEET_TRY_ASSIGN(place.x_mm, NumberArgument(args, "x_mm"));
+    FOCALFLEET_TRY_ASSIGN(place.y_mm, NumberArgument(args, "y_mm"));
+    row.place = place;
+  }
+  const auto poses = ResolveTargets({.source = "retarget", .rows = {row}}, layout, drives, places);
+  if (poses) return *(*poses)[i.value];
+  // The error begins with file and line, and a retarget has no file.
+  const std::string& text = poses.error().text;
+  return Fail(poses.error().code, text.substr(text.find(": ") + 2));
 }
 
 Result<Command> CommandOf(const ControlRequest& request, const FleetView& view) {

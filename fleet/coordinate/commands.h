@@ -70,9 +70,19 @@ struct WriteParameterCommand {
   Parameter parameter = Parameter::kRepeat;
   std::int32_t value = 0;
 };
-/// In a sector of a plane: the plane's coordinator starts a configuration.
-struct SectorApplyCommand {
-  ApplyCommand apply;
+/// In a sector of a plane: the plane's coordinator starts a configuration. Units that cannot take
+/// part fail with their reason; the others go on.
+struct SectorTask {
+  std::variant<ApplyCommand, HomeCommand> what;
+};
+/// In a sector of a plane: units of the configuration under way have other targets. A unit that
+/// moves ends its move first; all go in the next round.
+struct SectorRetargetCommand {
+  struct Target {
+    PositionerIndex unit;
+    Pose pose{};
+  };
+  std::vector<Target> targets;
 };
 /// Stores what the shell has changed already, and answers `text` when that is durable.
 struct KeepRowsCommand {
@@ -82,9 +92,9 @@ struct KeepRowsCommand {
 struct Command {
   std::uint64_t request = 0;
   std::variant<ApplyCommand, RetargetCommand, StopCommand, HomeCommand, MeasureCommand,
-               EnableCommand, AdoptCommand, WriteParameterCommand, KeepRowsCommand,
-               SectorApplyCommand, SectorRound, SectorStartCommand, SectorWithdrawCommand,
-               BorderEndCommand>
+               EnableCommand, AdoptCommand, WriteParameterCommand, KeepRowsCommand, SectorTask,
+               SectorRound, SectorStartCommand, SectorWithdrawCommand, BorderEndCommand,
+               SectorRetargetCommand>
       what;
 };
 

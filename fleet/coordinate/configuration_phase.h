@@ -54,7 +54,7 @@ inline constexpr Row kAllowed[kConfigurationPhaseCount] = {
     {kDisarming, Bits({kGathering, kReporting})},
     {kCommitting, Bits({kMoving, kDisarming})},
     {kMoving, kRoundOver},
-    {kHomeCommitting, Bits({kHoming, kReporting})},
+    {kHomeCommitting, Bits({kGathering, kHoming, kReporting})},
     {kHoming, Bits({kGathering, kReporting})},
     {kMeasuring, Bits({kGathering, kReporting})},
     {kReporting, Bits({kIdle})},

@@ -42,9 +42,11 @@ void SayWhatIsWaitedFor(ExecutorRooms* rooms) {
 }  // namespace
 
 bool IsHeld(const ExecutorRooms& rooms) {
-  return rooms.configuration.phase() == Phase::kCommitting &&
-         rooms.fleet.ledger.committed_through() >= rooms.round.commit_batch &&
-         rooms.round.count(Part::kHolding) == rooms.round.plan.moves.size();
+  const Phase phase = rooms.configuration.phase();
+  if (rooms.fleet.ledger.committed_through() < rooms.round.commit_batch) return false;
+  return phase == Phase::kHomeCommitting ||
+         (phase == Phase::kCommitting &&
+          rooms.round.count(Part::kHolding) == rooms.round.plan.moves.size());
 }
 
 void ConfigurationProgress::Begin(std::uint64_t request, const Goal& goal) {
@@ -136,11 +138,20 @@ void ConfigurationProgress::TakeRound(const SectorRound& round) {
   done.job = round.job;
   done.plan = Plan{};
   done.plan->moves = round.moves;
+  done.homing = round.homing;
   done.predicted = {round.makespan_s, round.energy_J, round.peak_power_W};
   TakePlan(done);
 }
 
+void ConfigurationProgress::AskAnew() {
+  if (configuration_.phase() == Phase::kPlanning) Gather();
+}
+
 void ConfigurationProgress::Withdraw() {
+  if (configuration_.phase() == Phase::kHomeCommitting) {
+    TakeBackIntents(fleet_, &round_);
+    return Gather();
+  }
   if (configuration_.phase() != Phase::kUploading && configuration_.phase() != Phase::kCommitting)
     return;
   TakeBackIntents(fleet_, &round_);
@@ -209,7 +220,8 @@ void ConfigurationProgress::Advance() {
       AdvanceCommit();
       break;
     case Phase::kHomeCommitting:
-      if (fleet_.ledger.committed_through() >= round_.commit_batch) StartHoming();
+      if (IsHeld(rooms_) && (!fleet_.config.in_plane || round_.border.start_at != kNever))
+        StartHoming();
       break;
     case Phase::kMoving:
       rooms_.late.Advance();
@@ -334,7 +346,8 @@ void ConfigurationProgress::EndRound() {
 void ConfigurationProgress::EndHomingWave() {
   rooms_.homing.EndWave();
   configuration_.view.round = 0;  // each wave has the full number of tries
-  if (!rooms_.homing.to_home().empty()) return Gather();
+  // A sector's units may have to make way for others still.
+  if (!rooms_.homing.to_home().empty() || fleet_.config.in_plane) return Gather();
   configuration_.EndWhenDurable(ConfigurationState::kDone);
 }
 

@@ -17,7 +17,8 @@
 
 namespace focalfleet {
 
-/// All units of the round hold their moves, and their intents are durable.
+/// All units of the round hold their moves, and their intents are durable. Units that home hold
+/// nothing.
 [[nodiscard]] bool IsHeld(const ExecutorRooms& rooms);
 
 class ConfigurationProgress {
@@ -35,6 +36,8 @@ class ConfigurationProgress {
   void TakeRound(const SectorRound& round);
   /// A round that has not started is given back, and another plan is asked for.
   void Withdraw();
+  /// The plan that is waited for is no use any more: another one is asked for.
+  void AskAnew();
   void OnExposure(const ExposureDone& done);
   /// Goes on as far as it can now.
   void Advance();

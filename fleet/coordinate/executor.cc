@@ -63,7 +63,7 @@ Status ConfigurationExecutor::Home(std::uint64_t request, const HomeCommand& com
   FOCALFLEET_TRY(MayBegin({}));
   FOCALFLEET_TRY_ASSIGN(const Goal goal, GoalOf(fleet_, command));
   progress_.Begin(request, goal);
-  if (goal.unproven)
+  if (goal.unproven && !goal.to_home.empty())
     fleet_.ledger.alarms().Raise(
         AlarmName::kHomingUnproven, {}, {},
         "homing of " + std::to_string(command.units.size()) +

@@ -38,9 +38,12 @@ Result<Goal> GoalOf(const Coordination& fleet, const ApplyCommand& command) {
 Result<Goal> GoalOf(const Coordination& fleet, const HomeCommand& command) {
   if (fleet.ledger.store_failing())
     return Fail(ErrorCode::kRefused, "the store cannot be written: nothing moves until it can");
-  if (command.units.empty()) return Fail(ErrorCode::kInvalid, "no unit to home");
+  if (command.units.empty() && !fleet.config.in_plane)
+    return Fail(ErrorCode::kInvalid, "no unit to home");
   for (const PositionerIndex i : command.units)
-    if (fleet.units[i].view.phase != UnitPhase::kReady)
+    if (i.value >= fleet.units.size())
+      return Fail(ErrorCode::kInvalid, "a unit to home that is none of this layout");
+    else if (!fleet.config.in_plane && fleet.units[i].view.phase != UnitPhase::kReady)
       return Fail(ErrorCode::kRefused,
                   fleet.units.NameOf(i) + " cannot home: it " + fleet.units.TroubleOf(i));
   Goal goal{.kind = ConfigurationKind::kHome,

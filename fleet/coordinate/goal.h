@@ -29,7 +29,8 @@ struct Goal {
 /// Errors: kRefused while the store cannot be written or nothing can measure; kInvalid where the
 /// command is for another layout, or names no unit.
 Result<Goal> GoalOf(const Coordination& fleet, const ApplyCommand& command);
-/// Errors: as above; kRefused where one of the units cannot be moved.
+/// Errors: as above; kRefused where one of the units cannot be moved. In a sector of a plane these
+/// are among the units to home, as no unit is no error.
 Result<Goal> GoalOf(const Coordination& fleet, const HomeCommand& command);
 /// Errors: as above. The targets of the configuration before stay.
 Result<Goal> GoalOf(const Coordination& fleet, const MeasureCommand& command);

@@ -79,6 +79,15 @@ void Homing::Clear() {
   wave_.clear();
 }
 
+void Homing::RefuseUnready() {
+  std::erase_if(to_home_, [&](PositionerIndex i) {
+    if (fleet_.units[i].view.phase == kReady) return false;
+    configuration_.outcomes.Set(i, TargetOutcome::kRefused,
+                                "it cannot home: it " + fleet_.units.TroubleOf(i));
+    return true;
+  });
+}
+
 bool Homing::Commit() {
   std::erase_if(wave_, [&](PositionerIndex i) {
     if (fleet_.units[i].view.phase == kReady) return false;

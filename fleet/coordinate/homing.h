@@ -24,6 +24,9 @@ class Homing {
   [[nodiscard]] const std::vector<PositionerIndex>& to_home() const { return to_home_; }
   [[nodiscard]] bool unproven() const { return unproven_; }
 
+  /// Units that cannot home now are refused, with the reason. A goal of a daemon of its own has
+  /// none, at first.
+  void RefuseUnready();
   /// The planner's next wave.
   void SetWave(std::vector<PositionerIndex> wave) { wave_ = std::move(wave); }
   [[nodiscard]] bool HasWave() const { return !to_home_.empty() && !wave_.empty(); }

@@ -30,6 +30,8 @@ std::optional<PlanJob> JobOfRound(bool sets_out, ExecutorRooms* rooms) {
   Configuration& configuration = rooms->configuration;
   Corrections& corrections = rooms->corrections;
   Round& round = rooms->round;
+  // A sector's units may be read still when a task begins, as after a kill in motion.
+  if (fleet.config.in_plane) rooms->homing.RefuseUnready();
   PlanJob job{.job = ++round.job,
               .start = {},
               .targets = {},

@@ -39,6 +39,12 @@ std::string FaultOf(const SectorRound& round, std::size_t units) {
     if (n > 0 && !(round.moves[n - 1].unit < round.moves[n].unit))
       return "moves are not in order, or a unit has two";
   }
+  for (std::size_t n = 0; n < round.homing.size(); ++n) {
+    if (round.homing[n].value >= units) return "a unit that homes is none of this sector";
+    if (n > 0 && !(round.homing[n - 1] < round.homing[n]))
+      return "units that home are not in order, or one comes twice";
+  }
+  if (!round.homing.empty() && !round.moves.empty()) return "it moves and homes";
   for (const SectorRound::Refused& refused : round.refused)
     if (refused.unit.value >= units) return "a refused unit is none of this sector";
   for (const SectorRound::FollowsBeyond& follows : round.follows)
@@ -51,7 +57,7 @@ std::string FaultOf(const SectorRound& round, std::size_t units) {
   if (!(round.start_skew_s >= 0 && round.start_skew_s <= 1) || !IsTime(round.makespan_s) ||
       !std::isfinite(round.energy_J) || !std::isfinite(round.peak_power_W))
     return "a figure is none";
-  if (round.finished && !round.moves.empty()) return "it ends and moves";
+  if (round.finished && !(round.moves.empty() && round.homing.empty())) return "it ends and moves";
   return {};
 }
 

@@ -7,6 +7,9 @@
 //                                       |
 //                                       +-> SectorWithdraw -> gives its moves back, asks again
 //
+// A round of homing has no moves: the units of a wave are held and started in the same way, while
+// every other unit in reach of one of them stands.
+//
 // Units on both sides of a border follow each other as others do. The end of a unit that units
 // beyond the border follow is among the effects; the end of one beyond it is a command.
 #pragma once
@@ -43,7 +46,8 @@ struct SectorRound {
 
   std::uint64_t job = 0;  // of the sector's, that is answered
   std::vector<UnitPlan> moves;
-  std::vector<Refused> refused;  // targets that are not served
+  std::vector<PositionerIndex> homing = {};  // units that home together; `moves` is empty then
+  std::vector<Refused> refused;              // targets that are not served
   std::vector<FollowsBeyond> follows;
   std::vector<LeadsBeyond> leads;
   double start_skew_s = 0;  // that the plan allows for

@@ -37,6 +37,32 @@ Status SectorRounds::Do(const BorderEndCommand& end) {
   return {};
 }
 
+Status SectorRounds::Do(const SectorRetargetCommand& command) {
+  Configuration& configuration = rooms_.configuration;
+  const std::size_t units = rooms_.fleet.units.size();
+  for (const SectorRetargetCommand::Target& target : command.targets)
+    if (target.unit.value >= units)
+      return Fail(ErrorCode::kInvalid, "another target for a unit that is none of this sector");
+  if (!configuration.busy() || configuration.view.kind != ConfigurationKind::kApply ||
+      configuration.stopping || configuration.phase() == ConfigurationPhase::kReporting)
+    return Fail(ErrorCode::kRefused, "no configuration with targets is under way");
+  for (const auto& [i, pose] : command.targets) {
+    const UnitView& view = rooms_.fleet.units[i].view;
+    const std::string name = rooms_.fleet.units.NameOf(i);
+    configuration.Retarget(i, pose);
+    rooms_.corrections.Forget(i);
+    rooms_.fleet.ledger.alarms().Raise(AlarmName::kUnitRetargeted, i, {},
+                                       name + " gets another target");
+    if (!view.enabled)
+      configuration.outcomes.Set(i, TargetOutcome::kRefused, "disabled: " + view.disabled_reason);
+    else if (rooms_.fleet.units.NearestInReach(i, pose) != pose)
+      configuration.outcomes.Set(i, TargetOutcome::kRefused,
+                                 "its range, as it was measured, ends before it");
+  }
+  progress_.AskAnew();
+  return {};
+}
+
 SectorView SectorRounds::View() const {
   const auto stage = [this] {
     switch (rooms_.configuration.phase()) {
@@ -45,8 +71,10 @@ SectorView SectorRounds::View() const {
       case ConfigurationPhase::kPlanning:
         return SectorStage::kAsking;
       case ConfigurationPhase::kCommitting:
+      case ConfigurationPhase::kHomeCommitting:
         return IsHeld(rooms_) ? SectorStage::kReady : SectorStage::kPreparing;
       case ConfigurationPhase::kMoving:
+      case ConfigurationPhase::kHoming:
         return SectorStage::kMoving;
       case ConfigurationPhase::kReporting:
         return SectorStage::kEnding;

@@ -22,6 +22,9 @@ class SectorRounds {
   Status Do(const SectorStartCommand& start);
   Status Do(const SectorWithdrawCommand& withdraw);
   Status Do(const BorderEndCommand& end);
+  /// Errors: kInvalid: a unit that is none of this sector; kRefused: no configuration with targets
+  /// is under way.
+  Status Do(const SectorRetargetCommand& command);
   [[nodiscard]] SectorView View() const;
 
  private:

@@ -18,10 +18,12 @@ PlaneCoordinator::PlaneCoordinator(const PlaneLayout* plane, const PlaneTimes& t
       parts_(plane->sectors()) {
   if (record_.under_way) {
     view_.configuration = record_.under_way->id;
+    view_.kind = record_.under_way->kind;
     view_.source = record_.under_way->source;
     view_.state = ConfigurationState::kPlanning;
   } else if (record_.last) {
     view_.configuration = record_.last->id;
+    view_.kind = record_.last->kind;
     view_.source = record_.last->source;
     view_.state = record_.last_state;
   }
@@ -77,6 +79,7 @@ void PlaneCoordinator::Step(const PlaneInputs& inputs, PlaneEffects* effects) {
       break;
   }
   Count();
+  AnswerRetargets();
   const bool speaks = view_.phase != PlanePhase::kListening && view_.phase != PlanePhase::kClaiming;
   if (speaks) out_->wake_at = std::min(out_->wake_at, sectors_.Say(now_, &out_->orders));
   if (view_.phase != PlanePhase::kIdle)
@@ -101,6 +104,7 @@ void PlaneCoordinator::Count() {
   const auto& configuration = record_.under_way ? record_.under_way : record_.last;
   if (!configuration) return;
   OutcomeCounts sum;
+  sum.targeted = static_cast<std::uint32_t>(configuration->to_home.size());
   for (const auto& target : configuration->targets) sum.targeted += target ? 1u : 0u;
   for (std::uint32_t sector = 0; sector < sectors_.size(); ++sector) {
     const auto& report = sectors_[sector].report;
@@ -123,7 +127,8 @@ void PlaneCoordinator::Idle() {
     const SectorReport& report = *sectors_[sector].report;
     const PlaneConfigurationId configuration = report.configuration;
     const bool knows_none = configuration.number == 0 && report.last_over.number == 0;
-    if (record_.last && (configuration == Id() || knows_none))
+    const bool tells = record_.last && record_.last->kind == ConfigurationKind::kApply;
+    if (tells && (configuration == Id() || knows_none))
       Recall(sector);
     else
       sectors_.Order(sector,
@@ -164,53 +169,155 @@ void PlaneCoordinator::Claim() {
 // ---- commands
 
 void PlaneCoordinator::Obey(const PlaneCommand& command) {
-  if (std::holds_alternative<PlaneStopCommand>(command.what)) {
-    if (view_.phase == PlanePhase::kListening || view_.phase == PlanePhase::kClaiming) {
-      out_->replies.push_back(
-          {command.request,
-           true,
-           Error{ErrorCode::kRefused, "this coordinator is not in charge: " + view_.waiting_for},
-           {}});
-      return;
-    }
-    Stop("stopped by the operator");
-    out_->replies.push_back({command.request, true, {}, "done"});
-    return;
-  }
-  const Status status = Apply(command.request, std::get<PlaneApplyCommand>(command.what));
+  const bool in_charge =
+      view_.phase != PlanePhase::kListening && view_.phase != PlanePhase::kClaiming;
+  const Status status =
+      in_charge
+          ? std::visit([&](const auto& what) { return Do(command.request, what); }, command.what)
+          : Fail(ErrorCode::kRefused, "this coordinator is not in charge: " + view_.waiting_for);
   if (!status) out_->replies.push_back({command.request, true, status.error(), {}});
 }
 
-Status PlaneCoordinator::Apply(std::uint64_t request, const PlaneApplyCommand& command) {
-  if (view_.phase == PlanePhase::kListening || view_.phase == PlanePhase::kClaiming)
-    return Fail(ErrorCode::kRefused, "this coordinator is not in charge: " + view_.waiting_for);
+Status PlaneCoordinator::Do(std::uint64_t request, const PlaneStopCommand& /*command*/) {
+  Stop("stopped by the operator");
+  out_->replies.push_back({request, true, {}, "done"});
+  return {};
+}
+
+Status PlaneCoordinator::MayBegin() const {
   if (record_.under_way)
     return Fail(ErrorCode::kRefused, "configuration " + std::to_string(record_.under_way->id) +
                                          " (" + record_.under_way->source +
                                          ") is under way: stop it or wait until it ends");
   if (view_.phase != PlanePhase::kIdle)
     return Fail(ErrorCode::kRefused, "the plane is still stopping: try again in a moment");
+  return {};
+}
+
+Status PlaneCoordinator::Do(std::uint64_t request, const PlaneApplyCommand& command) {
+  FOCALFLEET_TRY(MayBegin());
   const std::size_t units = plane_.layout().size();
   if (command.targets.size() != units ||
       (!command.target_ids.empty() && command.target_ids.size() != units))
     return Fail(ErrorCode::kInvalid, "targets for another layout");
-  record_.under_way = PlaneConfiguration{.id = record_.next_configuration++,
-                                         .source = command.source,
-                                         .fixed = command.fixed,
-                                         .targets = command.targets,
-                                         .target_ids = command.target_ids};
+  Begin(request, {.source = command.source,
+                  .fixed = command.fixed,
+                  .targets = command.targets,
+                  .target_ids = command.target_ids});
+  return {};
+}
+
+Status PlaneCoordinator::Do(std::uint64_t request, const PlaneHomeCommand& command) {
+  FOCALFLEET_TRY(MayBegin());
+  if (command.units.empty()) return Fail(ErrorCode::kInvalid, "no unit to home");
+  PlaneConfiguration configuration{.source = "home",
+                                   .targets = {},
+                                   .target_ids = {},
+                                   .kind = ConfigurationKind::kHome,
+                                   .to_home = command.units,
+                                   .unproven = command.unproven};
+  configuration.targets.resize(plane_.layout().size());
+  std::ranges::sort(configuration.to_home);
+  const auto twice = std::ranges::unique(configuration.to_home);
+  configuration.to_home.erase(twice.begin(), twice.end());
+  if (configuration.to_home.back().value >= plane_.layout().size())
+    return Fail(ErrorCode::kInvalid, "a unit to home that is none of this plane");
+  for (const PositionerIndex i : configuration.to_home)
+    if (const std::uint32_t sector = plane_.SectorOf(i); !sectors_.IsUsable(sector))
+      return Fail(ErrorCode::kRefused, "unit " + std::to_string(plane_.layout().unit(i).id.value) +
+                                           " is of " + NameOfSector(sector) + ", which " +
+                                           sectors_[sector].trouble);
+  Begin(request, std::move(configuration));
+  return {};
+}
+
+void PlaneCoordinator::Begin(std::uint64_t request, PlaneConfiguration configuration) {
+  configuration.id = record_.next_configuration++;
   view_ = {.phase = view_.phase,
            .epoch = view_.epoch,
-           .configuration = record_.under_way->id,
-           .source = command.source,
+           .configuration = configuration.id,
+           .kind = configuration.kind,
+           .source = configuration.source,
            .state = ConfigurationState::kPlanning};
+  record_.under_way = std::move(configuration);
   told_.assign(sectors_.size(), {});
+  tries_ = 0;
   request_ = request;
   out_->replies.push_back(
       {request, false, {}, "configuration " + std::to_string(record_.under_way->id)});
   Keep();
   Enter(PlanePhase::kRecording);
+}
+
+// ---- other targets
+
+Status PlaneCoordinator::Do(std::uint64_t request, const PlaneRetargetCommand& command) {
+  if (!record_.under_way)
+    return Fail(ErrorCode::kRefused, "no configuration is under way: apply one");
+  PlaneConfiguration& configuration = *record_.under_way;
+  const std::string name = "configuration " + std::to_string(configuration.id);
+  if (configuration.kind != ConfigurationKind::kApply)
+    return Fail(ErrorCode::kRefused, name + " (" + configuration.source + ") has no targets");
+  if (view_.phase == PlanePhase::kStopping || view_.phase == PlanePhase::kFinishing)
+    return Fail(ErrorCode::kRefused, name + " is ending: apply another one");
+  if (command.unit.value >= plane_.layout().size())
+    return Fail(ErrorCode::kInvalid, "another target for a unit that is none of this plane");
+  const std::uint32_t sector = plane_.SectorOf(command.unit);
+  if (!sectors_.IsUsable(sector))
+    return Fail(ErrorCode::kRefused,
+                "unit " + std::to_string(plane_.layout().unit(command.unit).id.value) + " is of " +
+                    NameOfSector(sector) + ", which " + sectors_[sector].trouble);
+  const std::uint64_t change =
+      configuration.changes.empty() ? 1 : configuration.changes.rbegin()->first + 1;
+  std::erase_if(configuration.changes,
+                [&](const auto& earlier) { return earlier.second == command.unit; });
+  configuration.changes.emplace(change, command.unit);
+  configuration.targets[command.unit.value] = command.target;
+  if (!configuration.target_ids.empty()) configuration.target_ids[command.unit.value].clear();
+  retargetings_.push_back({request, change, command.unit});
+  Keep();
   return {};
+}
+
+std::uint64_t PlaneCoordinator::LastChangeOf(std::uint32_t sector) const {
+  if (!record_.under_way) return 0;
+  std::uint64_t last = 0;
+  for (const auto& [number, unit] : record_.under_way->changes)
+    if (plane_.SectorOf(unit) == sector) last = number;
+  return last;
+}
+
+PlaneOrder PlaneCoordinator::RetargetsOf(std::uint32_t sector) const {
+  PlaneOrder order{.kind = OrderKind::kRetarget, .configuration = Id()};
+  for (const auto& [number, unit] : record_.under_way->changes) {
+    if (plane_.SectorOf(unit) != sector) continue;
+    order.retargets.push_back(
+        {number, {plane_.Local(unit), *record_.under_way->targets[unit.value]}});
+    order.change = number;
+  }
+  return order;
+}
+
+/// A change is answered when its sector has it, or will not get it any more.
+void PlaneCoordinator::AnswerRetargets() {
+  std::erase_if(retargetings_, [&](const Retargeting& one) {
+    const auto& report = sectors_[plane_.SectorOf(one.unit)].report;
+    const std::string name = "unit " + std::to_string(plane_.layout().unit(one.unit).id.value);
+    if (!record_.under_way) {
+      out_->replies.push_back(
+          {one.request,
+           true,
+           Error{ErrorCode::kUnavailable, "the configuration ended before " + name + " could go"},
+           {}});
+      return true;
+    }
+    if (kept_ != record_number_ || !report || report->configuration != Id() ||
+        report->change < one.change)
+      return false;
+    out_->replies.push_back(
+        {one.request, true, {}, name + " goes to its new target in the next round"});
+    return true;
+  });
 }
 
 void PlaneCoordinator::Reply(std::optional<Error> error, std::string text) {

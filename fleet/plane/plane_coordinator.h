@@ -25,6 +25,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -32,6 +33,7 @@
 #include <variant>
 #include <vector>
 
+#include "fleet/coordinate/configuration_view.h"
 #include "fleet/coordinate/effects.h"
 #include "fleet/plane/plane_layout.h"
 #include "fleet/plane/plane_plan.h"
@@ -46,6 +48,12 @@ struct PlaneConfiguration {
   bool fixed = false;
   std::vector<std::optional<Pose>> targets;  // Shape: (units of the plane)
   std::vector<std::string> target_ids;       // Shape: the same, or empty
+  ConfigurationKind kind = ConfigurationKind::kApply;
+  std::vector<PositionerIndex> to_home = {};  // ascending
+  bool unproven = false;                      // HomeCommand::unproven
+  /// The last change of each unit whose target was changed since the configuration began, by its
+  /// number.
+  std::map<std::uint64_t, PositionerIndex> changes = {};
   bool operator==(const PlaneConfiguration&) const = default;
 };
 
@@ -66,9 +74,18 @@ struct PlaneApplyCommand {
   std::vector<std::string> target_ids;
 };
 struct PlaneStopCommand {};
+struct PlaneHomeCommand {
+  std::vector<PositionerIndex> units;
+  bool unproven = false;  // HomeCommand::unproven
+};
+/// A unit of the configuration under way has another target, and goes there in the next round.
+struct PlaneRetargetCommand {
+  PositionerIndex unit;
+  Pose target{};
+};
 struct PlaneCommand {
   std::uint64_t request = 0;
-  std::variant<PlaneApplyCommand, PlaneStopCommand> what;
+  std::variant<PlaneApplyCommand, PlaneStopCommand, PlaneHomeCommand, PlaneRetargetCommand> what;
 };
 
 enum class PlanePhase : std::uint8_t {
@@ -114,6 +131,7 @@ struct PlaneView {
   PlanePhase phase = PlanePhase::kListening;
   PlaneEpoch epoch;
   std::uint64_t configuration = 0;
+  ConfigurationKind kind = ConfigurationKind::kApply;
   std::string source;
   ConfigurationState state = ConfigurationState::kDone;
   std::uint32_t rounds = 0;
@@ -144,12 +162,26 @@ class PlaneCoordinator {
   [[nodiscard]] const PlaneView& view() const { return view_; }
   [[nodiscard]] const SectorBook& sectors() const { return sectors_; }
   [[nodiscard]] bool busy() const { return record_.under_way.has_value(); }
+  /// Null: none.
+  [[nodiscard]] const PlaneConfiguration* under_way() const {
+    return record_.under_way ? &*record_.under_way : nullptr;
+  }
 
  private:
   void Enter(PlanePhase phase);
   void Keep();
   void Obey(const PlaneCommand& command);
-  Status Apply(std::uint64_t request, const PlaneApplyCommand& command);
+  Status Do(std::uint64_t request, const PlaneApplyCommand& command);
+  Status Do(std::uint64_t request, const PlaneStopCommand& command);
+  Status Do(std::uint64_t request, const PlaneHomeCommand& command);
+  Status Do(std::uint64_t request, const PlaneRetargetCommand& command);
+  [[nodiscard]] Status MayBegin() const;
+  void Begin(std::uint64_t request, PlaneConfiguration configuration);
+  void AnswerRetargets();
+  [[nodiscard]] std::uint64_t LastChangeOf(std::uint32_t sector) const;
+  [[nodiscard]] std::shared_ptr<const SectorTask> TaskOf(const PlaneConfiguration& configuration,
+                                                         std::uint32_t sector) const;
+  [[nodiscard]] PlaneOrder RetargetsOf(std::uint32_t sector) const;
   void Count();
   void Idle();
   void Recall(std::uint32_t sector);
@@ -184,8 +216,17 @@ class PlaneCoordinator {
   SectorClockWatch clock_watch_;
   PlaneView view_;
   HostInstant now_;
-  HostInstant since_{INT64_MIN};     // the phase began
-  std::uint64_t request_ = 0;        // that waits for the end; 0: none
+  HostInstant since_{INT64_MIN};  // the phase began
+  std::uint64_t request_ = 0;     // that waits for the end; 0: none
+  /// Changes of targets whose sectors have not carried them out yet.
+  struct Retargeting {
+    std::uint64_t request = 0;
+    std::uint64_t change = 0;
+    PositionerIndex unit;
+  };
+  std::vector<Retargeting> retargetings_;
+  std::uint32_t tries_ = 0;          // rounds, of homing since a unit was last homed
+  std::size_t to_home_ = 0;          // units that were left to home in the last plan
   std::uint64_t job_ = 0;            // the last asked for
   std::uint64_t round_ = 0;          // the last given out, in this epoch
   std::vector<OutcomeCounts> told_;  // Shape: (sectors); last told of the configuration

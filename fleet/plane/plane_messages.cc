@@ -71,6 +71,9 @@ std::string FaultOf(const SectorJob& job, std::size_t units) {
     if (!IsKnowledge(job.start[n]) || (job.targets[n] && !IsPose(*job.targets[n])) ||
         !IsPose(job.offsets[n]) || !IsDrive(job.drives[n]))
       return "it has a place or a drive that cannot be";
+  for (std::size_t n = 0; n < job.to_home.size(); ++n)
+    if (job.to_home[n].value >= units || (n > 0 && !(job.to_home[n - 1] < job.to_home[n])))
+      return "the units to home are not in order, or none of this sector";
   if (!(job.start_skew_s >= 0 && job.start_skew_s <= 1) ||
       !(job.notice_s >= 0 && job.notice_s <= 60))
     return "it allows for a skew or a notice that cannot be";

@@ -46,13 +46,20 @@ struct PlaneConfigurationId {
 
 enum class OrderKind : std::uint8_t {
   kStand,      // nothing to do; begins an epoch
-  kConfigure,  // begins a configuration, `apply`
+  kConfigure,  // begins a configuration, `task`
   kRound,      // the sector's part of a plan, `round_body`
   kStart,      // the round that is held starts
   kWithdraw,   // the round that is held is given back
   kStop,
+  kRetarget,  // units of the configuration under way have other targets, `retargets`
 };
-inline constexpr OrderKind kLastOrderKind = OrderKind::kStop;
+inline constexpr OrderKind kLastOrderKind = OrderKind::kRetarget;
+
+/// A unit of the configuration under way has another target.
+struct SectorRetarget {
+  std::uint64_t number = 0;  // of the change; grows within a configuration
+  SectorRetargetCommand::Target target;
+};
 
 struct PlaneOrder {
   PlaneEpoch epoch = {};
@@ -71,8 +78,11 @@ struct PlaneOrder {
   std::optional<DurationNs> ahead = {};  // the sector's clock less the plane's; none: not known yet
   std::uint64_t job_seen = 0;            // the last job of the sector that arrived
   std::uint64_t places_seen = 0;         // DigestOf the last places of the sector that arrived
+  /// The last change of targets: `task` has those up to it, or `retargets` all of the sector.
+  std::uint64_t change = 0;
+  std::vector<SectorRetarget> retargets = {};
   /// The body of the order. Null: the order is repeated without, because the sector has it.
-  std::shared_ptr<const ApplyCommand> apply = {};
+  std::shared_ptr<const SectorTask> task = {};
   std::shared_ptr<const SectorRound> round_body = {};
 };
 
@@ -94,6 +104,8 @@ struct SectorJob {
   std::vector<std::uint8_t> frozen;
   std::vector<Pose> offsets;
   std::vector<UnitDrive> drives;
+  std::vector<PositionerIndex> to_home = {};  // ascending; `targets` are none then
+  bool unproven = false;                      // HomeCommand::unproven
   bool fixed = false;
   double start_skew_s = 0;
   double notice_s = 0;
@@ -114,6 +126,7 @@ struct SectorReport {
   bool wants_body = false;  // the present order came without
   SectorStage stage = SectorStage::kIdle;
   PlaneConfigurationId configuration;  // the one under way
+  std::uint64_t change = 0;            // PlaneOrder::change of it, carried out
   std::uint64_t job = 0;               // the last one asked for
   std::uint64_t round = 0;         // the plane's number of the one that is held or moves; 0: none
   PlaneConfigurationId last_over;  // the last one that ended here

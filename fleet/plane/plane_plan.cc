@@ -27,7 +27,14 @@ class Divider {
     }
   }
 
-  PlanePlan Divide(const Plan& plan) {
+  PlanePlan Divide(const Plan& plan, const std::vector<PositionerIndex>& homing) {
+    // Units that make way come first; the next plan has the wave.
+    if (plan.moves.empty())
+      for (const PositionerIndex part : homing) {
+        const Place at = PlaceOf(part);
+        out_.rounds[at.sector].homing.push_back(at.local);
+        ++out_.homing;
+      }
     out_.makespan_s = plan.makespan_s;
     out_.moves = static_cast<std::uint32_t>(plan.moves.size());
     for (const UnitPlan& move : plan.moves) Add(move);
@@ -97,6 +104,7 @@ PlaneJob MakePlaneJob(std::uint64_t job, const PlaneLayout& plane,
     made.sector_jobs.push_back(sector == nullptr ? 0 : sector->job);
     if (sector == nullptr) continue;
     options.fixed |= sector->fixed;
+    made.plan.unproven |= sector->unproven;
     options.start_skew_s = std::max(options.start_skew_s, sector->start_skew_s);
     options.notice_s = std::max(options.notice_s, sector->notice_s);
   }
@@ -109,6 +117,8 @@ PlaneJob MakePlaneJob(std::uint64_t job, const PlaneLayout& plane,
     const auto beyond = plane.beyond({n});
     const bool strip =
         std::ranges::any_of(beyond, [&](std::uint32_t other) { return jobs[other] == nullptr; });
+    if (!strip && std::ranges::binary_search(sector->to_home, plane.Local({n})))
+      made.plan.to_home.push_back({static_cast<std::uint32_t>(made.units.size())});
     made.units.push_back({n});
     made.strip.push_back(strip ? 1 : 0);
     made.drives.push_back(sector->drives[local]);
@@ -121,6 +131,7 @@ PlaneJob MakePlaneJob(std::uint64_t job, const PlaneLayout& plane,
 }
 
 bool HasWork(const PlaneJob& job) {
+  if (!job.plan.to_home.empty()) return true;
   for (std::size_t n = 0; n < job.units.size(); ++n) {
     const UnitKnowledge& start = job.plan.start[n];
     const std::optional<Pose>& target = job.plan.targets[n];
@@ -142,9 +153,10 @@ PlanePlanDone RunPlaneJob(const PlaneJob& job, const PlaneLayout& plane,
     done.plan = tl::unexpected(planned.plan.error());
     return done;
   }
-  PlanePlan divided = Divider(job, plane).Divide(*planned.plan);
+  PlanePlan divided = Divider(job, plane).Divide(*planned.plan, planned.homing);
   for (std::uint32_t sector = 0; sector < plane.sectors(); ++sector) {
     SectorRound& round = divided.rounds[sector];
+    std::ranges::sort(round.homing);
     if (round.moves.empty()) continue;
     // The estimate wants the moves under the plane's numbers, of which it has the layout.
     Plan own;

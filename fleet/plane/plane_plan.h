@@ -5,6 +5,9 @@
 // Nothing that such a sector does meanwhile can then touch a unit that moves, whoever commands it:
 // it may be dead, cut off, or under another coordinator. Its units are left out of the plan, their
 // places need not be known.
+//
+// Homing. The moves that make way for a wave are a round of their own. The wave homes in a round in
+// which nothing else moves.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +41,7 @@ PlaneJob MakePlaneJob(std::uint64_t job, const PlaneLayout& plane,
                       std::span<const std::shared_ptr<const SectorJob>> jobs, double notice_s,
                       double clock_bound_s);
 
-/// True: some unit has a target, may go there, and is not there yet.
+/// True: some unit is to home, or has a target, may go there, and is not there yet.
 bool HasWork(const PlaneJob& job);
 
 /// A pair across a border for which the end of one may be noticed too late to stop the other.
@@ -52,6 +55,7 @@ struct PlanePlan {
   std::vector<SectorRound> rounds;  // Shape: (sectors); of those that take no part without moves
   double makespan_s = 0;
   std::uint32_t moves = 0;
+  std::uint32_t homing = 0;              // units that home; then there are no moves
   std::uint32_t follows_beyond = 0;      // pairs that follow each other across a border
   std::vector<UnnoticedPair> unnoticed;  // of these, where the notice is not enough
 };

@@ -11,19 +11,6 @@ namespace {
 // After the start instant: whoever has missed the order has given the round back, or will.
 constexpr DurationNs kStartOver = Milliseconds(1000);
 
-std::shared_ptr<const ApplyCommand> ApplyOf(const PlaneConfiguration& configuration,
-                                            std::span<const PositionerIndex> own) {
-  auto apply = std::make_shared<ApplyCommand>();
-  apply->source = configuration.source;
-  apply->fixed = configuration.fixed;
-  for (const PositionerIndex i : own) {
-    apply->targets.push_back(configuration.targets[i.value]);
-    if (!configuration.target_ids.empty())
-      apply->target_ids.push_back(configuration.target_ids[i.value]);
-  }
-  return apply;
-}
-
 bool IsAtTarget(const SectorJob& job, std::uint32_t local) {
   const std::optional<Pose>& target = job.targets[local];
   return target && IsPlace(job.start[local]) && PlaceOf(job.start[local]) == *target;
@@ -40,17 +27,48 @@ bool HasLeft(const SectorBook& sectors, std::uint32_t sector, const PlanePart& p
 
 }  // namespace
 
+/// The part of a sector in the configuration.
+std::shared_ptr<const SectorTask> PlaneCoordinator::TaskOf(const PlaneConfiguration& configuration,
+                                                           std::uint32_t sector) const {
+  auto task = std::make_shared<SectorTask>();
+  if (configuration.kind == ConfigurationKind::kHome) {
+    HomeCommand home{.units = {}, .unproven = configuration.unproven};
+    for (const PositionerIndex i : configuration.to_home)
+      if (plane_.SectorOf(i) == sector) home.units.push_back(plane_.Local(i));
+    task->what = std::move(home);
+    return task;
+  }
+  ApplyCommand apply{.source = configuration.source, .targets = {}, .fixed = configuration.fixed};
+  for (const PositionerIndex i : plane_.own(sector)) {
+    apply.targets.push_back(configuration.targets[i.value]);
+    if (!configuration.target_ids.empty())
+      apply.target_ids.push_back(configuration.target_ids[i.value]);
+  }
+  task->what = std::move(apply);
+  return task;
+}
+
 // ---- gathering
 
 /// Orders what brings the sector to ask for a plan, and says how far it is.
 PlaneCoordinator::Readiness PlaneCoordinator::Prepare(std::uint32_t sector) {
   const SectorBook::Entry& entry = sectors_[sector];
-  if (sectors_.IsHeard(sector) && entry.report->stage == SectorStage::kMoving)
-    return Readiness::kMoves;
-  if (!sectors_.IsUsable(sector)) return Readiness::kAbsent;
-  const SectorReport& report = *entry.report;
   const PlaneConfigurationId id = Id();
+  const bool usable = sectors_.IsUsable(sector);
+  if (sectors_.IsHeard(sector) && entry.report->stage == SectorStage::kMoving) {
+    // Its other targets are known to it before its next plan.
+    if (usable && entry.report->configuration == id &&
+        entry.report->change < LastChangeOf(sector) && kept_ == record_number_)
+      sectors_.Order(sector, RetargetsOf(sector));
+    return Readiness::kMoves;
+  }
+  if (!usable) return Readiness::kAbsent;
+  const SectorReport& report = *entry.report;
   if (report.configuration == id) {
+    if (report.change < LastChangeOf(sector)) {
+      if (kept_ == record_number_) sectors_.Order(sector, RetargetsOf(sector));
+      return Readiness::kWaits;
+    }
     if (report.round != 0 &&
         (report.stage == SectorStage::kReady || report.stage == SectorStage::kPreparing))
       sectors_.Order(sector,
@@ -64,10 +82,12 @@ PlaneCoordinator::Readiness PlaneCoordinator::Prepare(std::uint32_t sector) {
     return Readiness::kWaits;
   }
   if (report.last_over == id) return Readiness::kOver;
-  if (report.stage == SectorStage::kIdle)
+  // A change of targets is durable before a sector hears of it.
+  if (report.stage == SectorStage::kIdle && kept_ == record_number_)
     sectors_.Order(sector, {.kind = OrderKind::kConfigure,
                             .configuration = id,
-                            .apply = ApplyOf(*record_.under_way, plane_.own(sector))});
+                            .change = LastChangeOf(sector),
+                            .task = TaskOf(*record_.under_way, sector)});
   return Readiness::kWaits;
 }
 
@@ -125,7 +145,8 @@ void PlaneCoordinator::Plan(const std::vector<std::uint32_t>& ready, bool settli
     if (settling && now_ < since_ + times_.settle_patience) return;
     return Finish({}, nullptr);
   }
-  if (view_.rounds == limits::kRoundsPerPlane)
+  if (job.plan.to_home.size() < std::exchange(to_home_, job.plan.to_home.size())) tries_ = 0;
+  if (tries_++ == limits::kRoundsPerPlane)
     return Finish("gave up after " + std::to_string(view_.rounds) + " rounds", nullptr);
   for (std::uint32_t sector = 0; sector < sectors_.size(); ++sector)
     if (jobs[sector] == nullptr)
@@ -145,7 +166,7 @@ void PlaneCoordinator::TakePlan(const PlanePlanDone& done) {
     if (parts_[sector].job != 0 && HasLeft(sectors_, sector, parts_[sector], Id()))
       return Enter(PlanePhase::kGathering);
   if (!done.plan) return Finish(done.plan.error().text, nullptr);
-  if (done.plan->moves == 0) return Finish({}, &*done.plan);
+  if (done.plan->moves == 0 && done.plan->homing == 0) return Finish({}, &*done.plan);
   GiveRound(*done.plan);
 }
 
@@ -155,7 +176,9 @@ void PlaneCoordinator::GiveRound(PlanePlan plan) {
   view_.follows_beyond = plan.follows_beyond;
   view_.unnoticed = plan.unnoticed;
   view_.state = ConfigurationState::kUploading;
-  const auto moves = [&](std::uint32_t sector) { return !plan.rounds[sector].moves.empty(); };
+  const auto moves = [&](std::uint32_t sector) {
+    return !plan.rounds[sector].moves.empty() || !plan.rounds[sector].homing.empty();
+  };
   std::vector<std::vector<std::uint32_t>> together(sectors_.size());
   for (std::uint32_t sector = 0; sector < sectors_.size(); ++sector)
     for (const std::uint32_t other : plane_.neighbours(sector))
@@ -307,7 +330,7 @@ void PlaneCoordinator::Recall(std::uint32_t sector) {
     if (report.stage == SectorStage::kIdle)
       sectors_.Order(sector, {.kind = OrderKind::kConfigure,
                               .configuration = Id(),
-                              .apply = ApplyOf(*record_.last, plane_.own(sector))});
+                              .task = TaskOf(*record_.last, sector)});
     return;
   }
   const bool asks =

@@ -74,7 +74,7 @@ void SectorAgent::Hear(const PlaneOrder& order) {
   places_.seen = order.places_seen;
   const bool newer = !order_ || order.number > order_->number;
   const bool same = order_ && order.number == order_->number;
-  if (newer || (same && (order.apply != nullptr || order.round_body != nullptr))) {
+  if (newer || (same && (order.task != nullptr || order.round_body != nullptr))) {
     order_ = order;
   } else if (same) {
     order_->ahead = order.ahead;
@@ -92,6 +92,8 @@ void SectorAgent::Follow() {
             .frozen = in.job->frozen,
             .offsets = in.job->offsets,
             .drives = {in.drives.begin(), in.drives.end()},
+            .to_home = in.job->to_home,
+            .unproven = in.job->unproven,
             .fixed = in.job->options.fixed,
             .start_skew_s = in.job->options.start_skew_s,
             .notice_s = in.job->options.notice_s};
@@ -147,7 +149,7 @@ void SectorAgent::Obey() {
   if (!order_ || order_->number <= done_) return;
   if (!Do(*order_)) return;
   done_ = order_->number;
-  order_->apply.reset();
+  order_->task.reset();
   order_->round_body.reset();
   said_.changed = true;
 }
@@ -182,18 +184,33 @@ bool SectorAgent::Do(const PlaneOrder& order) {
       said_.news_changed = true;
       Send(StopCommand{});
       return true;
+    case OrderKind::kRetarget:
+      return Retarget(order);
   }
   return true;
 }
 
 bool SectorAgent::Configure(const PlaneOrder& order) {
   if (order.configuration == here_.now || order.configuration == here_.last) return true;
-  if (in_->view.stage != SectorStage::kIdle || order.apply == nullptr) return false;
+  if (in_->view.stage != SectorStage::kIdle || order.task == nullptr) return false;
   here_.now = order.configuration;
+  here_.change = order.change;
   here_.begun = false;
   here_.trouble.clear();
   round_ = {};
-  Send(SectorApplyCommand{*order.apply});
+  Send(*order.task);
+  return true;
+}
+
+/// A change is carried out once, however often it is ordered.
+bool SectorAgent::Retarget(const PlaneOrder& order) {
+  if (order.configuration != here_.now) return true;
+  if (!here_.begun) return false;
+  SectorRetargetCommand command;
+  for (const SectorRetarget& retarget : order.retargets)
+    if (retarget.number > here_.change) command.targets.push_back(retarget.target);
+  here_.change = std::max(here_.change, order.change);
+  if (!command.targets.empty()) Send(std::move(command));
   return true;
 }
 
@@ -207,7 +224,8 @@ bool SectorAgent::TakeRound(const PlaneOrder& order) {
   round_.held_since = in_->now;
   round_.body = order.round_body;
   for (const std::uint32_t sector : order.together) round_.together[sector] = {};
-  if (!order.round_body->moves.empty()) round_.course = Course::kHeld;
+  if (!order.round_body->moves.empty() || !order.round_body->homing.empty())
+    round_.course = Course::kHeld;
   said_.news_changed = true;
   Send(*order.round_body);
   return true;
@@ -339,6 +357,7 @@ SectorReport SectorAgent::Report() const {
                       .wants_body = order_ && order_->number > done_,
                       .stage = in.view.stage,
                       .configuration = here_.now,
+                      .change = here_.change,
                       .job = in.view.job,
                       .round = holds ? round_.number : 0,
                       .last_over = here_.last,

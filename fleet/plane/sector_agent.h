@@ -132,6 +132,7 @@ class SectorAgent {
   [[nodiscard]] bool Do(const PlaneOrder& order);
   [[nodiscard]] bool Configure(const PlaneOrder& order);
   [[nodiscard]] bool TakeRound(const PlaneOrder& order);
+  [[nodiscard]] bool Retarget(const PlaneOrder& order);
   void Confirm();
   [[nodiscard]] std::string WhoIsMissing() const;
   void GiveBack(const std::string& why);
@@ -157,7 +158,8 @@ class SectorAgent {
   /// The configuration of the plane here.
   struct Here {
     PlaneConfigurationId now;
-    bool begun = false;  // the sector's coordinator has it
+    std::uint64_t change = 0;  // PlaneOrder::change, carried out
+    bool begun = false;        // the sector's coordinator has it
     PlaneConfigurationId last;
     ConfigurationState last_state = ConfigurationState::kDone;
     std::string trouble;

@@ -13,7 +13,7 @@ std::string InMilliseconds(DurationNs time) {
 
 bool IsSame(const PlaneOrder& a, const PlaneOrder& b) {
   return a.kind == b.kind && a.incarnation == b.incarnation && a.configuration == b.configuration &&
-         a.round == b.round && a.job == b.job && a.start_at == b.start_at;
+         a.round == b.round && a.job == b.job && a.start_at == b.start_at && a.change == b.change;
 }
 
 }  // namespace
@@ -130,7 +130,7 @@ HostInstant SectorBook::Say(HostInstant now, std::vector<PlaneOrder>* orders) {
       const bool body_due =
           entry.body_said.ns == INT64_MIN || now >= entry.body_said + times_.body_repeat;
       if (IsDone(sector) || !body_due) {
-        order.apply.reset();
+        order.task.reset();
         order.round_body.reset();
       } else {
         entry.body_said = now;

@@ -134,15 +134,23 @@ std::vector<std::optional<Pose>> PlaneInProcess::DrawTargets(std::uint64_t seed)
 }
 
 std::uint64_t PlaneInProcess::Apply(std::vector<std::optional<Pose>> targets, std::uint32_t which) {
+  return Give(PlaneApplyCommand{"test", false, std::move(targets), {}}, which);
+}
+
+std::uint64_t PlaneInProcess::Give(decltype(PlaneCommand::what) what, std::uint32_t which) {
   const std::uint64_t request = next_request_++;
-  planes[which].commands.push_back(
-      {request, PlaneApplyCommand{"test", false, std::move(targets), {}}});
+  planes[which].commands.push_back({request, std::move(what)});
   return request;
 }
 
-void PlaneInProcess::Stop(std::uint32_t which) {
-  planes[which].commands.push_back({next_request_++, PlaneStopCommand{}});
+const ReplyEffect* PlaneInProcess::ReplyTo(std::uint64_t request, std::uint32_t which) const {
+  const auto& replies = planes[which].replies;
+  const auto it =
+      std::ranges::find(replies.rbegin(), replies.rend(), request, &ReplyEffect::request);
+  return it == replies.rend() ? nullptr : &*it;
 }
+
+void PlaneInProcess::Stop(std::uint32_t which) { Give(PlaneStopCommand{}, which); }
 
 // ---- turns
 

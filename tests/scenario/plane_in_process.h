@@ -86,6 +86,9 @@ class PlaneInProcess {
   /// `forget`: the host is another one, without the store.
   void StartPlane(std::uint32_t which = 0, bool forget = false);
   std::uint64_t Apply(std::vector<std::optional<Pose>> targets, std::uint32_t which = 0);
+  std::uint64_t Give(decltype(PlaneCommand::what) what, std::uint32_t which = 0);
+  /// The last reply to a request; null: none yet.
+  [[nodiscard]] const ReplyEffect* ReplyTo(std::uint64_t request, std::uint32_t which = 0) const;
   [[nodiscard]] std::vector<std::optional<Pose>> DrawTargets(std::uint64_t seed) const;
   void Stop(std::uint32_t which = 0);
 

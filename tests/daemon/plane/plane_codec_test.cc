@@ -30,6 +30,16 @@ PlaneOrder AnOrder() {
   body->leads.push_back({{3}, 0.5, 9});
   body->refused.push_back({{6}, "blocked by unit 7"});
   order.round_body = body;
+  order.change = 4;
+  order.retargets.push_back({4, {{3}, {7, -8}}});
+  return order;
+}
+
+PlaneOrder AHomingOrder() {
+  PlaneOrder order = AnOrder();
+  order.kind = OrderKind::kConfigure;
+  order.round_body.reset();
+  order.task = std::make_shared<const SectorTask>(SectorTask{HomeCommand{{{3}, {5}}, true}});
   return order;
 }
 
@@ -72,7 +82,13 @@ TEST(PlaneCodec, MessagesComeAcrossWithEveryField) {
   ASSERT_NE(order->round_body, nullptr);
   EXPECT_EQ(order->round_body->moves[0].path[0].segments()[0].delta, 5);
   EXPECT_EQ(order->round_body->refused[0].reason, "blocked by unit 7");
-  EXPECT_EQ(order->apply, nullptr);
+  EXPECT_EQ(order->task, nullptr);
+  ASSERT_EQ(order->retargets.size(), 1u);
+  EXPECT_EQ(order->retargets[0].target.pose, (Pose{7, -8}));
+  const auto homes = DecodePlaneOrder(Encode(AHomingOrder()));
+  ASSERT_TRUE(homes.has_value()) << homes.error().text;
+  ASSERT_NE(homes->task, nullptr);
+  EXPECT_EQ(std::get<HomeCommand>(homes->task->what).units.size(), 2u);
   const auto report = DecodeSectorReport(Encode(AReport()));
   ASSERT_TRUE(report.has_value()) << report.error().text;
   EXPECT_EQ(Encode(*report), Encode(AReport()));
@@ -83,10 +99,13 @@ TEST(PlaneCodec, MessagesComeAcrossWithEveryField) {
 
 TEST(PlaneCodec, RefusesCodesAndListsBeyondTheirLimits) {
   PlaneOrder order = AnOrder();
-  order.kind = static_cast<OrderKind>(6);
+  order.kind = static_cast<OrderKind>(7);
   EXPECT_FALSE(DecodePlaneOrder(Encode(order)).has_value());
   order = AnOrder();
   order.sector = limits::kSectors;
+  EXPECT_FALSE(DecodePlaneOrder(Encode(order)).has_value());
+  order = AnOrder();
+  order.retargets[0].target.pose[0] = INT32_MAX;
   EXPECT_FALSE(DecodePlaneOrder(Encode(order)).has_value());
   order = AnOrder();
   order.ahead = DurationNs{INT64_MAX};
@@ -108,7 +127,8 @@ TEST(PlaneCodec, RefusesCodesAndListsBeyondTheirLimits) {
 // Cut short anywhere, or with any byte changed, bytes are a message or an error; nothing else.
 TEST(PlaneCodec, AnyBytesAreAMessageOrAnError) {
   Rng rng(1);
-  for (const std::string& whole : {Encode(AnOrder()), Encode(AReport()), Encode(SomeNews())}) {
+  for (const std::string& whole :
+       {Encode(AnOrder()), Encode(AHomingOrder()), Encode(AReport()), Encode(SomeNews())}) {
     for (std::size_t n = 0; n < whole.size(); ++n) {
       const std::string cut = whole.substr(0, n);
       EXPECT_FALSE(DecodePlaneOrder(cut).has_value() && DecodeSectorReport(cut).has_value());

@@ -126,8 +126,8 @@ TEST(PlaneCoordinator, KeepsAConfigurationBeforeAnySectorHearsOfIt) {
   bench.Step(0.3);
   bench.Step(0.3);
   EXPECT_EQ(bench.orders[0].kind, OrderKind::kConfigure);
-  ASSERT_NE(bench.orders[0].apply, nullptr);
-  EXPECT_EQ(bench.orders[0].apply->targets.size(), 10u);
+  ASSERT_NE(bench.orders[0].task, nullptr);
+  EXPECT_EQ(std::get<ApplyCommand>(bench.orders[0].task->what).targets.size(), 10u);
 }
 
 TEST(PlaneCoordinator, GoesOnWithTheConfigurationOfItsEarlierLife) {

@@ -57,7 +57,7 @@ class Seat {
   /// The sector holds round 4 with sector 0, and has the order to start in 2 s.
   void Confirming() {
     auto apply = Order(OrderKind::kConfigure);
-    apply.apply = std::make_shared<const ApplyCommand>();
+    apply.task = std::make_shared<const SectorTask>();
     orders.push_back(apply);
     Step();
     view = {SectorStage::kAsking, 11};
@@ -123,7 +123,7 @@ TEST(SectorAgent, RefusesTheWordsOfAnEpochThatIsOver) {
   Seat seat;
   seat.kept = kSecond;
   auto order = seat.Order(OrderKind::kConfigure, kFirst);
-  order.apply = std::make_shared<const ApplyCommand>();
+  order.task = std::make_shared<const SectorTask>();
   seat.orders.push_back(order);
   seat.Step();
   EXPECT_TRUE(seat.out.commands.empty());
@@ -133,7 +133,7 @@ TEST(SectorAgent, RefusesTheWordsOfAnEpochThatIsOver) {
 TEST(SectorAgent, TakesANewEpochOnlyWhenItIsDurable) {
   Seat seat;
   auto order = seat.Order(OrderKind::kConfigure, kSecond);
-  order.apply = std::make_shared<const ApplyCommand>();
+  order.task = std::make_shared<const SectorTask>();
   seat.orders.push_back(order);
   seat.Step();
   EXPECT_TRUE(seat.out.commands.empty());
@@ -143,16 +143,16 @@ TEST(SectorAgent, TakesANewEpochOnlyWhenItIsDurable) {
   seat.kept = kSecond;
   seat.orders.push_back(order);
   seat.Step();
-  EXPECT_NE(seat.Sent<SectorApplyCommand>(), nullptr);
+  EXPECT_NE(seat.Sent<SectorTask>(), nullptr);
 }
 
 TEST(SectorAgent, DoesAnOrderOnceHoweverOftenItComes) {
   Seat seat;
   auto order = seat.Order(OrderKind::kConfigure);
-  order.apply = std::make_shared<const ApplyCommand>();
+  order.task = std::make_shared<const SectorTask>();
   seat.orders.push_back(order);
   seat.Step();
-  EXPECT_NE(seat.Sent<SectorApplyCommand>(), nullptr);
+  EXPECT_NE(seat.Sent<SectorTask>(), nullptr);
   seat.view.stage = SectorStage::kPreparing;
   for (int n = 0; n < 5; ++n) {
     seat.orders.push_back(order);
@@ -164,7 +164,7 @@ TEST(SectorAgent, DoesAnOrderOnceHoweverOftenItComes) {
 TEST(SectorAgent, PassesOverWhatWasMeantForAnEarlierLife) {
   Seat seat;
   auto order = seat.Order(OrderKind::kConfigure);
-  order.apply = std::make_shared<const ApplyCommand>();
+  order.task = std::make_shared<const SectorTask>();
   order.incarnation = 2;
   seat.orders.push_back(order);
   seat.Step();
