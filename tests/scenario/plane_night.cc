@@ -58,11 +58,20 @@ class Night {
     if (!plane_.RunUntil([this] { return plane_.IsIdle(); }, Seconds(30)))
       Broken("no coordinator takes charge");
     const auto first = plane_.DrawTargets(2 * options_.seed);
-    plane_.Apply(first);
+    const bool homes = !options_.fault && tasks_.Uniform() < 0.25;
+    if (homes)
+      plane_.Give(PlaneHomeCommand{DrawUnits(), false});
+    else
+      plane_.Apply(first);
     armed_ = true;
-    plane_.Run(Seconds(rng_.Uniform(30, 120)));
+    const double lasts_s = rng_.Uniform(30, 120);
+    const double retargets_after_s = tasks_.Uniform(0, 30);
+    const bool retargets = !options_.fault && tasks_.Uniform() < 0.4;
+    plane_.Run(Seconds(retargets_after_s));
+    if (retargets && plane_.planes[0].coordinator != nullptr) Retarget();
+    plane_.Run(Seconds(lasts_s - retargets_after_s));
     // Counts of a configuration are history where another coordinator has moved units since.
-    if (plane_.IsIdle() && !second_) judge_.LookAtArrivals(first);
+    if (plane_.IsIdle() && !second_ && !homes && !retargets) judge_.LookAtArrivals(first);
     Heal();
     const auto second = plane_.DrawTargets(2 * options_.seed + 1);
     Converge(second);
@@ -97,6 +106,21 @@ class Night {
       armed.victim = static_cast<std::uint32_t>(rng_.Below(plane_.layout().sectors()));
       armed_faults_.push_back(armed);
     }
+  }
+
+  /// Some units of the plane, in no order.
+  std::vector<PositionerIndex> DrawUnits() {
+    std::vector<PositionerIndex> units;
+    const std::uint64_t count = 1 + tasks_.Below(6);
+    for (std::uint64_t n = 0; n < count; ++n)
+      units.push_back({static_cast<std::uint32_t>(tasks_.Below(plane_.layout().layout().size()))});
+    return units;
+  }
+  /// Some units get other targets, which a draw for the whole plane has for them.
+  void Retarget() {
+    const auto other = plane_.DrawTargets(5 * options_.seed + 3);
+    for (const PositionerIndex i : DrawUnits())
+      plane_.Give(PlaneRetargetCommand{i, *other[i.value]});
   }
 
   void Tell(const std::string& what) {
@@ -362,6 +386,7 @@ class Night {
 
   const PlaneNightOptions options_;
   Rng rng_;
+  Rng tasks_ = Rng::Stream(options_.seed, "tasks");
   PlaneInProcess plane_;
   PlaneJudge judge_;
   std::vector<Armed> armed_faults_;

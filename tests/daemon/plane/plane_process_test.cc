@@ -238,6 +238,42 @@ TEST_F(PlaneProcesses, ShowTheWholePlane) {
   EXPECT_EQ(rows_with("ready", false), kUnits - kUnits / sectors_);
 }
 
+TEST_F(PlaneProcesses, HomeAndGiveOtherTargets) {
+  ASSERT_TRUE(Stands()) << Logs();
+  // A unit at the border of sectors 0 and 1: they are strips across x, of two buses each.
+  const std::uint32_t id = layout_->units()[11].id.value;
+  const auto refused = Ask("s0", "home", {{"unit_ids", {id}}});
+  ASSERT_FALSE(refused.has_value());
+  const auto unknown = Ask("plane", "home", {{"unit_ids", {id, 4711}}});
+  ASSERT_FALSE(unknown.has_value());
+  EXPECT_EQ(unknown.error().text, "there is no unit 4711");
+  const auto homed = Ask("plane", "home", {{"unit_ids", {id}}, {"wait", true}});
+  ASSERT_TRUE(homed.has_value()) << homed.error().text << Logs();
+  EXPECT_EQ((*homed)["kind"], "home");
+  EXPECT_EQ((*homed)["arrived"], 1) << *homed << Logs();
+  const auto none = Ask("plane", "retarget", {{"unit_id", id}, {"theta_deg", 10}, {"phi_deg", 90}});
+  ASSERT_FALSE(none.has_value());
+  EXPECT_EQ(none.error().text, "no configuration is under way: apply one");
+  ASSERT_TRUE(
+      Ask("plane", "apply", {{"source", "t"}, {"targets_csv", Targets(5)}, {"wait", false}}));
+  const auto other =
+      Ask("plane", "retarget", {{"unit_id", id}, {"theta_deg", 20}, {"phi_deg", 150}});
+  ASSERT_TRUE(other.has_value()) << other.error().text << Logs();
+  EXPECT_EQ((*other)["goes"], true) << *other;
+  ASSERT_TRUE(test::WaitUntil(
+      [&] {
+        const auto status = Ask("plane", "status");
+        return status && (*status)["busy"] == false;
+      },
+      kPatienceMs))
+      << Logs();
+  const auto unit = Ask("s0", "unit", {{"unit_id", id}});
+  ASSERT_TRUE(unit.has_value()) << unit.error().text;
+  const PointFp aim = FibreAt(layout_->units()[11], AxisAngles{20, 150});
+  EXPECT_NEAR((*unit)["target"]["x_mm"].get<double>(), aim.x_mm, 0.01) << *unit;
+  EXPECT_NEAR((*unit)["target"]["y_mm"].get<double>(), aim.y_mm, 0.01) << *unit;
+}
+
 class SecuredPlane : public PlaneProcesses {
  protected:
   SecuredPlane() : PlaneProcesses(2, true) {}
