@@ -173,6 +173,7 @@ class Coordinator::Impl {
   Status Do(std::uint64_t request, const SectorTask& c) {
     FOCALFLEET_TRY(OfPlane(true));
     if (const auto* home = std::get_if<HomeCommand>(&c.what)) return executor_.Home(request, *home);
+    if (std::holds_alternative<MeasureCommand>(c.what)) return executor_.Measure(request);
     return executor_.Apply(request, std::get<ApplyCommand>(c.what));
   }
   /// The other commands of a plane.

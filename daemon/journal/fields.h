@@ -1,6 +1,6 @@
 // The fields of plain values, in the order of their declaration, without a list of them: a type
 // that gets a field more is written, read and digested with it. This works for aggregates of up to
-// 22 fields, for the containers that they have, and for strong ids.
+// 24 fields, for the containers that they have, and for strong ids.
 //
 //   WriteFields(value, &bytes);            as bytes, little-endian as this machine is
 //   ReadFields(&reader, &value);           back again; false: the bytes are none of it
@@ -40,7 +40,7 @@ constexpr bool IsMadeOf(std::index_sequence<I...>) {
   return requires { T{(static_cast<void>(I), AnyValue{})...}; };
 }
 /// The number of fields of an aggregate.
-template <class T, std::size_t N = 22>
+template <class T, std::size_t N = 24>
 constexpr std::size_t FieldCount() {
   if constexpr (IsMadeOf<T>(std::make_index_sequence<N>()))
     return N;
@@ -119,10 +119,16 @@ void ForFields(T& value, const Each& each) {
   } else if constexpr (kFields == 21) {
     auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u] = value;
     all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u);
-  } else {
-    static_assert(kFields == 22, "a case for so many fields is missing here");
+  } else if constexpr (kFields == 22) {
     auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v] = value;
     all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v);
+  } else if constexpr (kFields == 23) {
+    auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w] = value;
+    all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w);
+  } else {
+    static_assert(kFields == 24, "a case for so many fields is missing here");
+    auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w, x] = value;
+    all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w, x);
   }
 }
 

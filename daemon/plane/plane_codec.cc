@@ -24,7 +24,8 @@ bool AreSectors(const std::vector<std::uint32_t>& sectors) {
 
 bool IsGood(const ApplyCommand& apply) {
   if (apply.targets.size() > limits::kUnits || apply.target_ids.size() > limits::kUnits ||
-      apply.source.size() > limits::kTextBytes || apply.measure || !apply.offsets.empty())
+      apply.source.size() > limits::kTextBytes || !apply.offsets.empty() ||
+      (apply.measure && !(apply.measure->tolerance_um > 0 && apply.measure->tolerance_um <= 1e6)))
     return false;
   return std::ranges::all_of(apply.targets, [](const std::optional<Pose>& target) {
     return !target || std::ranges::all_of(*target, [](std::int64_t vectors) {
@@ -33,7 +34,21 @@ bool IsGood(const ApplyCommand& apply) {
   });
 }
 
+bool IsGood(const ExposureFindings& findings) {
+  return findings.measurements.size() <= limits::kUnits &&
+         findings.camera_trouble.size() <= limits::kTextBytes &&
+         std::ranges::all_of(findings.measurements, [](const Measurement& measurement) {
+           const auto& covariance = measurement.covariance;
+           return static_cast<std::size_t>(measurement.status) < kMeasurementStatusCount &&
+                  measurement.source <= MeasurementSource::kSensors &&
+                  std::isfinite(measurement.x_mm) && std::isfinite(measurement.y_mm) &&
+                  std::isfinite(covariance.xx) && std::isfinite(covariance.xy) &&
+                  std::isfinite(covariance.yy) && !measurement.carrier;
+         });
+}
+
 bool IsGood(const SectorTask& task) {
+  if (std::holds_alternative<MeasureCommand>(task.what)) return true;
   if (const auto* home = std::get_if<HomeCommand>(&task.what))
     return home->units.size() <= limits::kUnits;
   return IsGood(std::get<ApplyCommand>(task.what));
@@ -51,6 +66,7 @@ bool IsGood(const PlaneOrder& order) {
                                      return IsWithin(vectors, limits::kPositionMax);
                                    });
                              }) &&
+         (order.findings == nullptr || !*order.findings || IsGood(**order.findings)) &&
          (order.task == nullptr || IsGood(*order.task));
 }
 

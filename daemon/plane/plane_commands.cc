@@ -48,13 +48,16 @@ Status CheckKnown(const PlaneInstant& plane, const Standing& standing, Positione
                   "are not known");
 }
 
+Status CheckCamera(const PlaneInstant& plane) {
+  if (plane.has_camera) return {};
+  return Fail(ErrorCode::kRefused,
+              "there is no camera to measure with: [camera] of the plane's coordinator");
+}
+
 Result<PlaneApplyCommand> PlaneApplyOf(const PlaneInstant& plane, const Json& args) {
-  for (const char* name : {"corrections", "observe"})
-    if (args.contains(name))
-      return Fail(ErrorCode::kRefused,
-                  "a plane is not measured: each sector's daemon has the "
-                  "sensors of its own units alone");
   PlaneApplyCommand command;
+  FOCALFLEET_TRY_ASSIGN(command.measure, MeasureArgument(args));
+  if (command.measure) FOCALFLEET_TRY(CheckCamera(plane));
   FOCALFLEET_TRY_ASSIGN(command.source, TextArgumentOr(args, "source", "targets"));
   FOCALFLEET_TRY_ASSIGN(command.fixed, FlagArgumentOr(args, "fixed", false));
   FOCALFLEET_TRY_ASSIGN(const std::string csv,
@@ -128,13 +131,18 @@ Result<PlaneCommand> AsCommand(Result<T> what) {
 }  // namespace
 
 bool IsPlaneCommand(const std::string& verb) {
-  return verb == "apply" || verb == "home" || verb == "retarget" || verb == "stop";
+  return verb == "apply" || verb == "home" || verb == "retarget" || verb == "stop" ||
+         verb == "measure";
 }
 
 Result<PlaneCommand> PlaneCommandOf(const PlaneInstant& plane, const ControlRequest& request) {
   const std::string& verb = request.verb;
   if (verb == "apply") return AsCommand(PlaneApplyOf(plane, request.args));
   if (verb == "home") return AsCommand(PlaneHomeOf(plane, request.args));
+  if (verb == "measure") {
+    FOCALFLEET_TRY(CheckCamera(plane));
+    return PlaneCommand{0, PlaneMeasureCommand{}};
+  }
   if (verb == "retarget") return AsCommand(PlaneRetargetOf(plane, request.args));
   return PlaneCommand{0, PlaneStopCommand{}};
 }

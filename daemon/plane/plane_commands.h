@@ -1,4 +1,5 @@
-// The command that a request asks of a plane's coordinator: apply, home, retarget, stop. The
+// The command that a request asks of a plane's coordinator: apply, home, measure,
+// retarget, stop. The
 // arguments are those of a daemon of its own (verbs/requested_command.h). They are checked against
 // places and drives of all units as their sectors last reported them, before anything happens.
 #pragma once

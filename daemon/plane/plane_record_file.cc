@@ -29,6 +29,11 @@ json JsonOf(const PlaneConfiguration& configuration, const Layout& layout) {
   json changes = json::array();
   for (const auto& [number, i] : configuration.changes)
     changes.push_back({number, layout.unit(i).id.value});
+  const auto& measure = configuration.measure;
+  json measured = measure ? json{{"corrections", measure->corrections},
+                                 {"tolerance_um", measure->tolerance_um},
+                                 {"observe", measure->observe}}
+                          : json();
   return {{"id", configuration.id},
           {"source", configuration.source},
           {"fixed", configuration.fixed},
@@ -36,7 +41,8 @@ json JsonOf(const PlaneConfiguration& configuration, const Layout& layout) {
           {"kind", Name(configuration.kind)},
           {"to_home", std::move(to_home)},
           {"unproven", configuration.unproven},
-          {"changes", std::move(changes)}};
+          {"changes", std::move(changes)},
+          {"measure", std::move(measured)}};
 }
 
 constexpr ConfigurationState kOverStates[] = {
@@ -67,7 +73,8 @@ std::optional<PositionerIndex> UnitOf(const json& id, const Layout& layout) {
   return layout.Find(UnitId{id.get<std::uint32_t>()});
 }
 
-constexpr ConfigurationKind kKinds[] = {ConfigurationKind::kApply, ConfigurationKind::kHome};
+constexpr ConfigurationKind kKinds[] = {ConfigurationKind::kApply, ConfigurationKind::kHome,
+                                        ConfigurationKind::kMeasure};
 
 /// Takes the task of a configuration that is more than targets. Records of earlier versions have
 /// none.
@@ -91,6 +98,18 @@ Status TakeTask(const json& from, const std::string& path, const Layout& layout,
     configuration->to_home.push_back(*unit);
   }
   std::ranges::sort(configuration->to_home);
+  if (const json measure = from.value("measure", json()); !measure.is_null()) {
+    const auto has = [&measure](const char* key) {
+      return measure.is_object() && measure.contains(key);
+    };
+    if (!has("corrections") || !has("tolerance_um") || !has("observe") ||
+        !measure["corrections"].is_number_unsigned() || measure["corrections"] > UINT8_MAX ||
+        !measure["tolerance_um"].is_number() || !measure["observe"].is_boolean())
+      return Bad(path, "how a configuration is measured");
+    configuration->measure = {.corrections = measure["corrections"].get<std::uint8_t>(),
+                              .tolerance_um = measure["tolerance_um"].get<double>(),
+                              .observe = measure["observe"].get<bool>()};
+  }
   for (const json& change : changes) {
     const auto unit =
         change.is_array() && change.size() == 2 ? UnitOf(change[1], layout) : std::nullopt;

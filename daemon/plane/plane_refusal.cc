@@ -53,9 +53,6 @@ Error RefusalOf(const PlaneInstant& plane, const ControlRequest& request) {
     if (!plane.plane->layout().Find(UnitId{unit}))
       return {ErrorCode::kInvalid, "there is no unit " + std::to_string(unit) + " in the plane"};
   const std::string doors = DoorsOf(plane, units);
-  if (verb == "measure")
-    return {ErrorCode::kRefused,
-            "a plane is not measured: each sector's daemon has the sensors of its own units alone"};
   if (verb == "history")
     return {ErrorCode::kRefused,
             "a plane's coordinator keeps the configuration under way alone; each sector's daemon "

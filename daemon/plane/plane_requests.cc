@@ -7,6 +7,7 @@
 #include "daemon/access/rights.h"
 #include "daemon/plane/plane_commands.h"
 #include "daemon/plane/plane_refusal.h"
+#include "daemon/status/status_json.h"
 #include "daemon/usage/build_version.h"
 
 namespace focalfleet {
@@ -69,6 +70,8 @@ Json PlaneConfigurationJson(const PlaneInstant& plane) {
   const std::uint32_t counted = c.arrived + c.refused + c.failed + c.stopped + c.unmeasured;
   json["left_out"] = c.targeted > counted ? c.targeted - counted : 0;
   json["guarantee"] = GuaranteeJson(view);
+  json["measured"] = MeasuredJson(view.measured);
+  json["not_measured"] = view.not_measured.empty() ? Json() : Json(view.not_measured);
   return json;
 }
 

@@ -27,6 +27,7 @@ struct PlaneInstant {
   WallTime at;
   PlaneLinkCounters link;
   PlaneAlarms* alarms = nullptr;
+  bool has_camera = false;
   const PlaneTable* table = nullptr;  // null: it is not looked at now
   SteadyTime steady = {};             // `now` of the table
 };

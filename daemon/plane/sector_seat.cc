@@ -64,6 +64,7 @@ void SectorSeat::Gather(HostInstant now, const Coordinator& coordinator,
                .view = coordinator.sector(),
                .configuration = &coordinator.configuration(),
                .job = last_.plan_job ? &*last_.plan_job : nullptr,
+               .exposure = last_.exposure ? &*last_.exposure : nullptr,
                .drives = coordinator.drives(),
                .places = PlacesIfDue(now, coordinator),
                .replies = last_.replies,
@@ -84,6 +85,7 @@ void SectorSeat::Gather(HostInstant now, const Coordinator& coordinator,
 
 void SectorSeat::Take(Effects* effects) {
   if (effects->plan_job) last_.plan_job = std::exchange(effects->plan_job, std::nullopt);
+  if (effects->exposure) last_.exposure = std::exchange(effects->exposure, std::nullopt);
   const auto of_plane = [](const ReplyEffect& reply) {
     return reply.request == SectorAgent::kRequest;
   };

@@ -331,7 +331,7 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   FOCALFLEET_TRY(reader.Verdict());
   config.drive.axis[1] = config.drive.axis[0];
   config.timing.bit_rate_bps = config.bus.bit_rate_bps;
-  config.timing.has_camera = config.camera.present();
+  config.timing.has_camera = config.camera.present() || config.sector.present();
   config.timing.reads_sensors = !config.hall.model.empty();
   config.timing.data_bit_rate_bps = config.bus.can_fd ? config.bus.data_bit_rate_bps : 0;
   config.timing.sync_line = !config.sync.chip.empty();

@@ -16,6 +16,7 @@
 #include <random>
 #include <utility>
 
+#include "daemon/camera/camera_work.h"
 #include "daemon/clock/clock.h"
 #include "daemon/control/id_ranges.h"
 #include "daemon/loop/event_loop.h"
@@ -24,6 +25,7 @@
 #include "daemon/plane/plane_output.h"
 #include "daemon/plane/plane_record_file.h"
 #include "daemon/plane/plane_requests.h"
+#include "daemon/process/camera_setup.h"
 #include "daemon/process/control_door.h"
 #include "daemon/process/dds_setup.h"
 #include "daemon/process/fleet_setup.h"
@@ -42,6 +44,7 @@ struct KeptRecord {
   Status status;
 };
 using Planner = JobThread<PlaneJob, PlanePlanDone>;
+using Camera = JobThread<CameraWork, ExposureDone>;
 using Keeper = JobThread<KeepJob, KeptRecord>;
 
 std::uint64_t RandomNumber() {
@@ -75,6 +78,8 @@ class PlaneDaemon {
   void Wait();
   void Perform(PlaneEffects* effects);
   void TakeKept();
+  Status OpenCamera();
+  void Expose(PlaneExposure exposure);
   [[nodiscard]] PlaneInstant Instant() {
     return {.plane = plane_.get(),
             .coordinator = coordinator_.get(),
@@ -82,6 +87,7 @@ class PlaneDaemon {
             .at = WallTime::Now(),
             .link = link_->counters(),
             .alarms = &alarms_,
+            .has_camera = camera_.thread != nullptr,
             .steady = std::chrono::steady_clock::now()};
   }
 
@@ -97,6 +103,12 @@ class PlaneDaemon {
   std::unique_ptr<PlaneLink> link_;
   std::unique_ptr<Planner> planner_;
   std::unique_ptr<Keeper> keeper_;
+  struct {
+    std::unique_ptr<CameraWorker> worker;  // none: there is no camera
+    CameraPort* port = nullptr;            // of the worker, which owns it
+    std::unique_ptr<Camera> thread;        // none: there is no camera
+  } camera_;
+  std::vector<ExposureDone> not_exposed_;
   struct Keeping {
     KeepJob job;
     std::uint64_t kept = 0;  // the number of the last record that is durable
@@ -154,6 +166,7 @@ Status PlaneDaemon::Start() {
                              [this](const std::string& trouble) {
                                troubles_->Report(AlarmName::kDdsMissing, "the plane", trouble);
                              }});
+  FOCALFLEET_TRY(OpenCamera());
   output_ = std::make_unique<PlaneOutput>(
       PlaneOutput::Options{.plane = plane_.get(),
                            .dds = DdsOptionsOf(config_.dds),
@@ -163,11 +176,47 @@ Status PlaneDaemon::Start() {
                              troubles_->Report(AlarmName::kDdsMissing, part, trouble);
                            }});
   // The link takes new credentials by itself.
-  credentials_ =
-      WatchCredentials(config_.dds, troubles_.get(), [this](WallTime end) { output_->Renew(end); });
+  credentials_ = WatchCredentials(config_.dds, troubles_.get(), [this](WallTime end) {
+    output_->Renew(end);
+    if (camera_.port != nullptr) camera_.port->Renew(end);
+  });
   spdlog::info("coordinator of a plane of {} units in {} sectors", plane_->layout().size(),
                plane_->sectors());
   return {};
+}
+
+Status PlaneDaemon::OpenCamera() {
+  if (!config_.camera.present()) return {};
+  FOCALFLEET_TRY_ASSIGN(CameraSite site, LoadCameraSite(config_.camera));
+  FOCALFLEET_TRY_ASSIGN(auto port, OpenCameraPort(config_, site.sensor, troubles_.get()));
+  camera_.port = port.get();
+  camera_.worker = std::make_unique<CameraWorker>(
+      std::move(port),
+      CameraWorker::Options{
+          .layout = &plane_->layout(),
+          .site = std::move(site),
+          .patience = std::chrono::milliseconds(config_.camera.patience.ns / 1'000'000),
+          .speed = config_.clock.speed,
+          .log = [](const std::string& text) { spdlog::warn("{}", text); }});
+  FOCALFLEET_TRY_ASSIGN(
+      camera_.thread,
+      Camera::Create(
+          [worker = camera_.worker.get()](const CameraWork& work, const std::atomic<bool>& ending) {
+            return worker->Do(work, ending);
+          },
+          signal_.get(), {.name = "camera"}));
+  return {};
+}
+
+void PlaneDaemon::Expose(PlaneExposure exposure) {
+  const std::uint64_t id = exposure.job.id;
+  CameraWork work{std::move(exposure.job), std::move(exposure.drives)};
+  if (camera_.thread != nullptr && camera_.thread->Submit(&work)) return;
+  not_exposed_.push_back(
+      {id, Fail(ErrorCode::kUnavailable, camera_.thread == nullptr
+                                             ? "the plane's coordinator has no camera"
+                                             : "the camera's thread has no room")});
+  signal_->Raise();
 }
 
 void PlaneDaemon::Run() {
@@ -180,6 +229,7 @@ void PlaneDaemon::Run() {
   static_cast<void>(service_.Send("STOPPING=1"));
   requests_->Close();
   credentials_.reset();
+  camera_.thread.reset();
   output_.reset();
   link_.reset();
 }
@@ -205,6 +255,9 @@ void PlaneDaemon::Turn() {
   TakeKept();
   std::vector<PlanePlanDone> plans;
   while (auto plan = planner_->Take()) plans.push_back(std::move(*plan));
+  std::vector<ExposureDone> exposures = std::exchange(not_exposed_, {});
+  while (auto done = camera_.thread != nullptr ? camera_.thread->Take() : std::nullopt)
+    exposures.push_back(std::move(*done));
   const PlaneMail mail = link_->Take();
   std::vector<PlaneCommand> commands;
   requests_->Service(Instant(), &commands);
@@ -213,6 +266,7 @@ void PlaneDaemon::Turn() {
                       .reports = mail.reports,
                       .commands = commands,
                       .plans = plans,
+                      .exposures = exposures,
                       .kept = keeping_.kept},
                      &effects);
   Perform(&effects);
@@ -241,6 +295,7 @@ void PlaneDaemon::Perform(PlaneEffects* effects) {
     PlaneJob job = std::move(*effects->job);
     if (!planner_->Submit(&job)) spdlog::error("the planner's thread has no room");
   }
+  if (effects->exposure) Expose(std::move(*effects->exposure));
   for (const ReplyEffect& reply : effects->replies) requests_->Reply(Instant(), reply);
 }
 

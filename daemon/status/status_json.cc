@@ -148,9 +148,9 @@ double FractionOf(const FleetView& fleet) {
 
 }  // namespace
 
-Json MeasuredJson(const ConfigurationView& configuration) {
+Json MeasuredJson(const std::vector<MeasuredRound>& measured) {
   Json rounds = Json::array();
-  for (const MeasuredRound& round : configuration.measured)
+  for (const MeasuredRound& round : measured)
     rounds.push_back({{"exposure", round.exposure},
                       {"measured", round.measured},
                       {"unknown", round.unknown},
@@ -185,7 +185,7 @@ Json ConfigurationJson(const FleetView& view) {
             {"unserved", UnservedJson(view)}};
   PutUpload(c.upload, &json);
   PutStarts(view, &json);
-  json["measured"] = MeasuredJson(c);
+  json["measured"] = MeasuredJson(c.measured);
   json["not_measured"] = c.not_measured.empty() ? Json() : Json(c.not_measured);
   return json;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "daemon/control/messages.h"
 #include "daemon/status/shell_facts.h"
@@ -11,6 +12,8 @@ namespace focalfleet {
 
 /// The current or last configuration, with every unit that was not served.
 Json ConfigurationJson(const FleetView& view);
+/// The summary of each exposure of a configuration.
+Json MeasuredJson(const std::vector<MeasuredRound>& measured);
 /// The progress that a waiting client receives. Cost: constant.
 Json ProgressJson(const FleetView& view);
 Json StatusJson(const FleetView& view, const ShellFacts& facts);

@@ -14,6 +14,8 @@
 namespace focalfleet {
 namespace {
 
+constexpr double kCorrectionsMax = 10;
+
 Result<Axis> AxisArgument(const Json& args) {
   FOCALFLEET_TRY_ASSIGN(const std::string name, TextArgument(args, "axis"));
   for (const Axis axis : kAxes)
@@ -26,28 +28,6 @@ Result<Parameter> ParameterArgument(const Json& args) {
   for (std::uint8_t p = 0; p < kParameterCount; ++p)
     if (name == Name(static_cast<Parameter>(p))) return static_cast<Parameter>(p);
   return Fail(ErrorCode::kInvalid, "there is no parameter '" + name + "'");
-}
-
-constexpr double kCorrectionsMax = 10;
-
-/// {corrections?, tolerance_um?, observe?}: without `corrections` nothing is measured.
-Result<std::optional<ApplyCommand::Measure>> MeasureOf(const Json& args) {
-  if (!args.contains("corrections")) return std::optional<ApplyCommand::Measure>();
-  ApplyCommand::Measure measure;
-  FOCALFLEET_TRY_ASSIGN(const double corrections, NumberArgument(args, "corrections"));
-  if (!(corrections >= 0 && corrections <= kCorrectionsMax) ||
-      corrections != std::floor(corrections))
-    return Fail(ErrorCode::kInvalid, "corrections must be a whole number in 0..10");
-  measure.corrections = static_cast<std::uint8_t>(corrections);
-  if (args.contains("tolerance_um")) {
-    FOCALFLEET_TRY_ASSIGN(measure.tolerance_um, NumberArgument(args, "tolerance_um"));
-    if (!(measure.tolerance_um > 0 && measure.tolerance_um <= 1e6))
-      return Fail(ErrorCode::kInvalid, "tolerance_um must be above 0 and at most 1e6");
-  }
-  FOCALFLEET_TRY_ASSIGN(measure.observe, FlagArgumentOr(args, "observe", false));
-  if (measure.observe && measure.corrections > 0)
-    return Fail(ErrorCode::kInvalid, "observe takes no corrections: what is seen is not used");
-  return std::optional(measure);
 }
 
 /// Offsets by which each unit's place will exceed its count at its target, by the model in force. A
@@ -86,7 +66,7 @@ Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   now.reserve(view.layout->size());
   for (std::uint32_t n = 0; n < view.layout->size(); ++n)
     now.push_back(view.coordinator->unit({n}).knowledge);
-  FOCALFLEET_TRY_ASSIGN(const auto measure, MeasureOf(args));
+  FOCALFLEET_TRY_ASSIGN(const auto measure, MeasureArgument(args));
   ApplyCommand command{.source = source, .targets = {}, .fixed = fixed, .measure = measure};
   FOCALFLEET_TRY_ASSIGN(command.targets,
                         ResolveTargets(targets, *view.layout, view.coordinator->drives(), now));
@@ -239,6 +219,25 @@ Result<std::vector<PositionerIndex>> UnitsArgument(const Layout& layout,
     if (std::exchange(named[i->value], std::uint8_t{1}) == 0) units.push_back(*i);
   }
   return units;
+}
+
+Result<std::optional<ApplyCommand::Measure>> MeasureArgument(const Json& args) {
+  if (!args.contains("corrections")) return std::optional<ApplyCommand::Measure>();
+  ApplyCommand::Measure measure;
+  FOCALFLEET_TRY_ASSIGN(const double corrections, NumberArgument(args, "corrections"));
+  if (!(corrections >= 0 && corrections <= kCorrectionsMax) ||
+      corrections != std::floor(corrections))
+    return Fail(ErrorCode::kInvalid, "corrections must be a whole number in 0..10");
+  measure.corrections = static_cast<std::uint8_t>(corrections);
+  if (args.contains("tolerance_um")) {
+    FOCALFLEET_TRY_ASSIGN(measure.tolerance_um, NumberArgument(args, "tolerance_um"));
+    if (!(measure.tolerance_um > 0 && measure.tolerance_um <= 1e6))
+      return Fail(ErrorCode::kInvalid, "tolerance_um must be above 0 and at most 1e6");
+  }
+  FOCALFLEET_TRY_ASSIGN(measure.observe, FlagArgumentOr(args, "observe", false));
+  if (measure.observe && measure.corrections > 0)
+    return Fail(ErrorCode::kInvalid, "observe takes no corrections: what is seen is not used");
+  return std::optional(measure);
 }
 
 Result<Pose> TargetArgument(const Json& args, PositionerIndex i, const Layout& layout,

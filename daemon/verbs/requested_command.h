@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,6 +24,10 @@ Result<std::vector<PositionerIndex>> UnitsArgument(const Layout& layout,
 Result<Pose> TargetArgument(const Json& args, PositionerIndex i, const Layout& layout,
                             std::span<const UnitDrive> drives,
                             std::span<const UnitKnowledge> places);
+
+/// {corrections?, tolerance_um?, observe?}: without `corrections` nothing is measured. Errors:
+/// kInvalid: a number out of its range, or corrections of what is observed alone.
+Result<std::optional<ApplyCommand::Measure>> MeasureArgument(const Json& args);
 
 /// A request that changes something, as the coordinator's command. Verbs: apply retarget stop home
 /// measure disable enable adopt params_set. Errors: kInvalid or kRefused, with a text for people;

@@ -11,8 +11,10 @@
 
 #include "fleet/coordinate/sector_round.h"
 #include "fleet/drive.h"
+#include "fleet/measurement.h"
 #include "fleet/records.h"
 #include "protocol/base/ids.h"
+#include "protocol/base/result.h"
 
 namespace focalfleet {
 
@@ -31,6 +33,7 @@ struct ApplyCommand {
     /// With `observe`, findings are reported and stored, and not used: units go on by their own
     /// counts and without a unidirectional approach. Campaigns measure blind moves in this way.
     bool observe = false;
+    bool operator==(const Measure&) const = default;
   };
   std::optional<Measure> measure = {};
   /// An offset is a model's prediction of a unit's place at its target, less the unit's own count
@@ -73,7 +76,7 @@ struct WriteParameterCommand {
 /// In a sector of a plane: the plane's coordinator starts a configuration. Units that cannot take
 /// part fail with their reason; the others go on.
 struct SectorTask {
-  std::variant<ApplyCommand, HomeCommand> what;
+  std::variant<ApplyCommand, HomeCommand, MeasureCommand> what;
 };
 /// In a sector of a plane: units of the configuration under way have other targets. A unit that
 /// moves ends its move first; all go in the next round.
@@ -83,6 +86,12 @@ struct SectorRetargetCommand {
     Pose pose{};
   };
   std::vector<Target> targets;
+};
+/// In a sector of a plane: what the plane's camera has found of its units; the answer to an
+/// ExposureJob.
+struct SectorFindings {
+  std::uint64_t exposure = 0;
+  Result<ExposureFindings> findings;
 };
 /// Stores what the shell has changed already, and answers `text` when that is durable.
 struct KeepRowsCommand {
@@ -94,7 +103,7 @@ struct Command {
   std::variant<ApplyCommand, RetargetCommand, StopCommand, HomeCommand, MeasureCommand,
                EnableCommand, AdoptCommand, WriteParameterCommand, KeepRowsCommand, SectorTask,
                SectorRound, SectorStartCommand, SectorWithdrawCommand, BorderEndCommand,
-               SectorRetargetCommand>
+               SectorRetargetCommand, SectorFindings>
       what;
 };
 

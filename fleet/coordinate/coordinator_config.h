@@ -37,7 +37,8 @@ struct CoordinatorConfig {
   bool sync_line = false;
   bool in_plane = false;  // the daemon owns one sector of a plane (fleet/coordinate/sector_round.h)
   bool reads_sensors = false;  // of units that have some (units.csv, [hall] model)
-  bool has_camera = false;     // else a configuration that asks for one is refused
+  bool has_camera = false;     // its own or its plane's; else a configuration that asks for one is
+                               // refused
   DurationNs sync_lead = Milliseconds(5);
   /// The last piece of each axis' way in a measured configuration, with its direction. Play and
   /// wind-up of a gear are then always on one side. 0: no such piece.

@@ -90,16 +90,19 @@ enum class SectorStage : std::uint8_t {
   kAsking,     // waits for its part of a plan
   kReady,      // all units of the round are armed, their intents are durable
   kMoving,
-  kEnding,  // the last rows are being written
+  kEnding,   // the last rows are being written
+  kLooking,  // waits for the findings of an exposure of the plane's camera
 };
-inline constexpr std::uint8_t kSectorStageCount = 6;
+inline constexpr std::uint8_t kSectorStageCount = 7;
 constexpr const char* Name(SectorStage stage) {
-  constexpr const char* kNames[] = {"idle", "preparing", "asking", "ready", "moving", "ending"};
+  constexpr const char* kNames[] = {"idle",   "preparing", "asking", "ready",
+                                    "moving", "ending",    "looking"};
   return kNames[static_cast<std::size_t>(stage)];
 }
 struct SectorView {
   SectorStage stage = SectorStage::kIdle;
-  std::uint64_t job = 0;  // the last one asked for
+  std::uint64_t job = 0;     // the last one asked for
+  bool looks_first = false;  // kLooking: no unit has moved yet
 };
 
 /// The fault of a round that came from outside, for a sector of `units` units; empty: none.

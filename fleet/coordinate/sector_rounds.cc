@@ -1,8 +1,10 @@
 #include "fleet/coordinate/sector_rounds.h"
 
+#include <algorithm>
 #include <string>
 
 #include "fleet/coordinate/watch.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 
@@ -63,6 +65,21 @@ Status SectorRounds::Do(const SectorRetargetCommand& command) {
   return {};
 }
 
+Status SectorRounds::Do(const SectorFindings& findings) {
+  const std::size_t units = rooms_.fleet.units.size();
+  const auto is_none = [units](const Measurement& measurement) {
+    return measurement.unit.value >= units ||
+           (measurement.other && measurement.other->value >= units) ||
+           (measurement.place && std::ranges::any_of(*measurement.place, [](std::int64_t vectors) {
+              return vectors < -limits::kPositionMax || vectors > limits::kPositionMax;
+            }));
+  };
+  if (findings.findings && std::ranges::any_of(findings.findings->measurements, is_none))
+    return Fail(ErrorCode::kInvalid, "findings about units or places that are none of this sector");
+  progress_.OnExposure({findings.exposure, findings.findings});
+  return {};
+}
+
 SectorView SectorRounds::View() const {
   const auto stage = [this] {
     switch (rooms_.configuration.phase()) {
@@ -76,13 +93,15 @@ SectorView SectorRounds::View() const {
       case ConfigurationPhase::kMoving:
       case ConfigurationPhase::kHoming:
         return SectorStage::kMoving;
+      case ConfigurationPhase::kMeasuring:
+        return rooms_.measurement.IsAsked() ? SectorStage::kLooking : SectorStage::kPreparing;
       case ConfigurationPhase::kReporting:
         return SectorStage::kEnding;
       default:
         return SectorStage::kPreparing;
     }
   };
-  return {stage(), rooms_.round.job};
+  return {stage(), rooms_.round.job, rooms_.measurement.look() == Look::kBefore};
 }
 
 }  // namespace focalfleet

@@ -25,6 +25,9 @@ class SectorRounds {
   /// Errors: kInvalid: a unit that is none of this sector; kRefused: no configuration with targets
   /// is under way.
   Status Do(const SectorRetargetCommand& command);
+  /// Findings of an exposure that nobody waits for have no effect. Errors: kInvalid: a unit that is
+  /// none of this sector, or a place that cannot be.
+  Status Do(const SectorFindings& findings);
   [[nodiscard]] SectorView View() const;
 
  private:

@@ -46,6 +46,7 @@ void PlaneCoordinator::Step(const PlaneInputs& inputs, PlaneEffects* effects) {
     Enter(PlanePhase::kListening);
   }
   for (const PlanePlanDone& plan : inputs.plans) TakePlan(plan);
+  for (const ExposureDone& exposure : inputs.exposures) TakeExposure(exposure);
   for (const PlaneCommand& command : inputs.commands) Obey(command);
   switch (view_.phase) {
     case PlanePhase::kListening:
@@ -64,6 +65,7 @@ void PlaneCoordinator::Step(const PlaneInputs& inputs, PlaneEffects* effects) {
       Gather();
       break;
     case PlanePhase::kPlanning:
+    case PlanePhase::kMeasuring:
       break;
     case PlanePhase::kPreparing:
       Preparing();
@@ -105,7 +107,10 @@ void PlaneCoordinator::Count() {
   if (!configuration) return;
   OutcomeCounts sum;
   sum.targeted = static_cast<std::uint32_t>(configuration->to_home.size());
-  for (const auto& target : configuration->targets) sum.targeted += target ? 1u : 0u;
+  if (configuration->kind == ConfigurationKind::kMeasure)
+    for (const OutcomeCounts& told : told_) sum.targeted += told.targeted;
+  else
+    for (const auto& target : configuration->targets) sum.targeted += target ? 1u : 0u;
   for (std::uint32_t sector = 0; sector < sectors_.size(); ++sector) {
     const auto& report = sectors_[sector].report;
     const bool works = record_.under_way && report && report->configuration == Id();
@@ -203,7 +208,8 @@ Status PlaneCoordinator::Do(std::uint64_t request, const PlaneApplyCommand& comm
   Begin(request, {.source = command.source,
                   .fixed = command.fixed,
                   .targets = command.targets,
-                  .target_ids = command.target_ids});
+                  .target_ids = command.target_ids,
+                  .measure = command.measure});
   return {};
 }
 
@@ -227,6 +233,18 @@ Status PlaneCoordinator::Do(std::uint64_t request, const PlaneHomeCommand& comma
       return Fail(ErrorCode::kRefused, "unit " + std::to_string(plane_.layout().unit(i).id.value) +
                                            " is of " + NameOfSector(sector) + ", which " +
                                            sectors_[sector].trouble);
+  Begin(request, std::move(configuration));
+  return {};
+}
+
+/// Targets of the configuration before stay, so that errors can be reported.
+Status PlaneCoordinator::Do(std::uint64_t request, const PlaneMeasureCommand& /*command*/) {
+  FOCALFLEET_TRY(MayBegin());
+  PlaneConfiguration configuration{
+      .source = "measure", .targets = {}, .target_ids = {}, .kind = ConfigurationKind::kMeasure};
+  configuration.targets.resize(plane_.layout().size());
+  if (record_.last && record_.last->kind != ConfigurationKind::kHome)
+    configuration.targets = record_.last->targets;
   Begin(request, std::move(configuration));
   return {};
 }

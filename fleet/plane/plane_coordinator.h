@@ -5,12 +5,16 @@
 //                                                     +-----------+------------+----------+
 //                                                     |
 //                                                     +-> finishing -> idle      (stop: stopping)
+//                                                     |        |
+//                                                     +--- measuring
 //
 // gathering   every sector is given the configuration, and asks for a plan
 // planning    one plan of all units of the sectors that ask (plane_plan.h)
 // preparing   each sector uploads its part, reads back, arms, and makes its intents durable
 // moving      all sectors that hold the round have the start instant; each moves or gives it back
-// finishing   nothing is left to move: each sector ends the configuration
+// finishing   nothing is left to move: each sector ends the configuration, or asks for an exposure
+// measuring   the plane's camera looks at all units at once; each sector is told of its own, and
+//             asks for the next round of corrections, or ends the configuration
 //
 // The state is what the sectors report. The coordinator keeps its epoch, the configuration under
 // way and the last one that is over, and nothing else, so that a new life of it goes on in any
@@ -35,6 +39,7 @@
 
 #include "fleet/coordinate/configuration_view.h"
 #include "fleet/coordinate/effects.h"
+#include "fleet/coordinate/inputs.h"
 #include "fleet/plane/plane_layout.h"
 #include "fleet/plane/plane_plan.h"
 #include "fleet/plane/sector_book.h"
@@ -51,6 +56,7 @@ struct PlaneConfiguration {
   ConfigurationKind kind = ConfigurationKind::kApply;
   std::vector<PositionerIndex> to_home = {};  // ascending
   bool unproven = false;                      // HomeCommand::unproven
+  std::optional<ApplyCommand::Measure> measure = {};
   /// The last change of each unit whose target was changed since the configuration began, by its
   /// number.
   std::map<std::uint64_t, PositionerIndex> changes = {};
@@ -72,8 +78,11 @@ struct PlaneApplyCommand {
   bool fixed = false;
   std::vector<std::optional<Pose>> targets;
   std::vector<std::string> target_ids;
+  std::optional<ApplyCommand::Measure> measure = {};
 };
 struct PlaneStopCommand {};
+/// Measures all units once; no unit moves.
+struct PlaneMeasureCommand {};
 struct PlaneHomeCommand {
   std::vector<PositionerIndex> units;
   bool unproven = false;  // HomeCommand::unproven
@@ -85,7 +94,9 @@ struct PlaneRetargetCommand {
 };
 struct PlaneCommand {
   std::uint64_t request = 0;
-  std::variant<PlaneApplyCommand, PlaneStopCommand, PlaneHomeCommand, PlaneRetargetCommand> what;
+  std::variant<PlaneApplyCommand, PlaneStopCommand, PlaneHomeCommand, PlaneRetargetCommand,
+               PlaneMeasureCommand>
+      what;
 };
 
 enum class PlanePhase : std::uint8_t {
@@ -99,11 +110,13 @@ enum class PlanePhase : std::uint8_t {
   kMoving,
   kFinishing,
   kStopping,
+  kMeasuring,
 };
-inline constexpr std::size_t kPlanePhaseCount = 10;
+inline constexpr std::size_t kPlanePhaseCount = 11;
 constexpr const char* Name(PlanePhase phase) {
-  constexpr const char* kNames[] = {"listening", "claiming",  "idle",   "recording", "gathering",
-                                    "planning",  "preparing", "moving", "finishing", "stopping"};
+  constexpr const char* kNames[] = {"listening", "claiming", "idle",      "recording",
+                                    "gathering", "planning", "preparing", "moving",
+                                    "finishing", "stopping", "measuring"};
   return kNames[static_cast<std::size_t>(phase)];
 }
 
@@ -112,12 +125,21 @@ struct PlaneInputs {
   std::span<const SectorReport> reports = {};
   std::span<const PlaneCommand> commands = {};
   std::span<const PlanePlanDone> plans = {};
-  std::uint64_t kept = 0;  // the number of the last record that is durable
+  std::span<const ExposureDone> exposures = {};  // units by the plane's positions
+  std::uint64_t kept = 0;                        // the number of the last record that is durable
+};
+
+/// Lists of the job and `drives` are by the plane's positions.
+struct PlaneExposure {
+  ExposureJob job;
+  std::vector<UnitDrive> drives;
 };
 
 struct PlaneEffects {
   std::vector<PlaneOrder> orders;
   std::optional<PlaneJob> job;
+  /// Asks the plane's camera for an exposure, and for the place of each unit in it.
+  std::optional<PlaneExposure> exposure;
   std::optional<PlaneRecord> record;  // is to be made durable, under `record_number`
   std::uint64_t record_number = 0;
   std::vector<ReplyEffect> replies;
@@ -141,13 +163,15 @@ struct PlaneView {
   /// The guarantee of the last plan over borders.
   std::uint32_t follows_beyond = 0;
   std::vector<UnnoticedPair> unnoticed = {};
-  HostInstant start_at = kNever;  // of the last round
+  HostInstant start_at = kNever;             // of the last round
+  std::vector<MeasuredRound> measured = {};  // blind, then after each correction
+  std::string not_measured = {};             // why the last exposure could not be used
 };
 
 /// The part of a sector in a round.
 struct PlanePart {
   std::uint64_t incarnation = 0;
-  std::uint64_t job = 0;  // 0: none
+  std::uint64_t job = 0;  // or the exposure that it asks for; 0: none
   bool operator==(const PlanePart&) const = default;
 };
 
@@ -175,6 +199,7 @@ class PlaneCoordinator {
   Status Do(std::uint64_t request, const PlaneStopCommand& command);
   Status Do(std::uint64_t request, const PlaneHomeCommand& command);
   Status Do(std::uint64_t request, const PlaneRetargetCommand& command);
+  Status Do(std::uint64_t request, const PlaneMeasureCommand& command);
   [[nodiscard]] Status MayBegin() const;
   void Begin(std::uint64_t request, PlaneConfiguration configuration);
   void AnswerRetargets();
@@ -188,9 +213,15 @@ class PlaneCoordinator {
   void Listen();
   void Claim();
   void Gather();
-  enum class Readiness : std::uint8_t { kReady, kWaits, kMoves, kOver, kAbsent };
+  enum class Readiness : std::uint8_t { kReady, kWaits, kMoves, kOver, kLooks, kAbsent };
   Readiness Prepare(std::uint32_t sector);
+  Readiness PrepareOwn(std::uint32_t sector);
   void Plan(const std::vector<std::uint32_t>& ready, bool settling);
+  [[nodiscard]] std::shared_ptr<const SectorJob> StandingJob(std::uint32_t sector) const;
+  [[nodiscard]] bool Looks(std::uint32_t sector) const;
+  void Look();
+  void TakeExposure(const ExposureDone& done);
+  void Summarise(const ExposureFindings& findings);
   void TakePlan(const PlanePlanDone& done);
   void GiveRound(PlanePlan plan);
   void Preparing();
@@ -225,9 +256,10 @@ class PlaneCoordinator {
     PositionerIndex unit;
   };
   std::vector<Retargeting> retargetings_;
-  std::uint32_t tries_ = 0;          // rounds, of homing since a unit was last homed
+  std::uint32_t tries_ = 0;          // rounds since the last exposure, or since a unit was homed
   std::size_t to_home_ = 0;          // units that were left to home in the last plan
   std::uint64_t job_ = 0;            // the last asked for
+  std::uint64_t exposure_ = 0;       // the same
   std::uint64_t round_ = 0;          // the last given out, in this epoch
   std::vector<OutcomeCounts> told_;  // Shape: (sectors); last told of the configuration
   std::vector<PlanePart> parts_;     // Shape: (sectors)

@@ -63,6 +63,20 @@ std::string FaultOf(const SectorPlaces& places, std::size_t units) {
   return {};
 }
 
+std::string FaultOf(const SectorExposure& exposure, std::size_t units) {
+  if (exposure.expected.size() != units || exposure.before.size() != units ||
+      exposure.reported.size() != units || exposure.seen.size() != units ||
+      exposure.wanted.size() != units || exposure.drives.size() != units)
+    return "it is for another number of units";
+  for (std::size_t n = 0; n < units; ++n)
+    if (!IsKnowledge(exposure.expected[n]) || !IsDrive(exposure.drives[n]) ||
+        (exposure.before[n] && !IsPose(*exposure.before[n])) ||
+        (exposure.reported[n] && !IsPose(*exposure.reported[n])))
+      return "it has a place or a drive that cannot be";
+  if (!std::isfinite(exposure.tolerance_um)) return "its tolerance is no number";
+  return {};
+}
+
 std::string FaultOf(const SectorJob& job, std::size_t units) {
   if (job.start.size() != units || job.targets.size() != units || job.frozen.size() != units ||
       job.offsets.size() != units || job.drives.size() != units)

@@ -52,8 +52,9 @@ enum class OrderKind : std::uint8_t {
   kWithdraw,   // the round that is held is given back
   kStop,
   kRetarget,  // units of the configuration under way have other targets, `retargets`
+  kFindings,  // of the exposure `job` that the sector asks for, `findings`
 };
-inline constexpr OrderKind kLastOrderKind = OrderKind::kRetarget;
+inline constexpr OrderKind kLastOrderKind = OrderKind::kFindings;
 
 /// A unit of the configuration under way has another target.
 struct SectorRetarget {
@@ -69,7 +70,7 @@ struct PlaneOrder {
   OrderKind kind = OrderKind::kStand;
   PlaneConfigurationId configuration = {};
   std::uint64_t round = 0;    // of kRound and kStart; grows within the epoch
-  std::uint64_t job = 0;      // the sector's, of kRound, kStart and kWithdraw
+  std::uint64_t job = 0;      // the sector's, of kRound, kStart, kWithdraw and kFindings
   HostInstant start_at = {};  // of kStart
   /// For kRound: sectors beyond the border that move in this round, too. None of them starts
   /// without the others.
@@ -78,12 +79,14 @@ struct PlaneOrder {
   std::optional<DurationNs> ahead = {};  // the sector's clock less the plane's; none: not known yet
   std::uint64_t job_seen = 0;            // the last job of the sector that arrived
   std::uint64_t places_seen = 0;         // DigestOf the last places of the sector that arrived
+  std::uint64_t exposure_seen = 0;       // the last exposure asked for that arrived
   /// The last change of targets: `task` has those up to it, or `retargets` all of the sector.
   std::uint64_t change = 0;
   std::vector<SectorRetarget> retargets = {};
   /// The body of the order. Null: the order is repeated without, because the sector has it.
   std::shared_ptr<const SectorTask> task = {};
   std::shared_ptr<const SectorRound> round_body = {};
+  std::shared_ptr<const Result<ExposureFindings>> findings = {};  // units by the sector's positions
 };
 
 /// Where the units of a sector stand, and their drives, while nothing is under way: targets are
@@ -107,11 +110,27 @@ struct SectorJob {
   std::vector<PositionerIndex> to_home = {};  // ascending; `targets` are none then
   bool unproven = false;                      // HomeCommand::unproven
   bool fixed = false;
+  bool leave_stuck = false;  // PlanOptions::leave_stuck
   double start_skew_s = 0;
   double notice_s = 0;
 };
 /// The fault of a job that came from outside; empty: none.
 std::string FaultOf(const SectorJob& job, std::size_t units);
+
+/// The sector asks for the places of its units in an exposure: as an ExposureJob.
+struct SectorExposure {
+  std::uint64_t id = 0;
+  bool first = false;                   // its units are to be found before any unit moves
+  std::vector<UnitKnowledge> expected;  // Shape: (units of the sector), as all lists
+  std::vector<std::optional<Pose>> before;
+  std::vector<std::optional<Pose>> reported;
+  std::vector<std::uint8_t> seen;
+  std::vector<std::uint8_t> wanted;
+  double tolerance_um = 0;
+  std::vector<UnitDrive> drives;
+};
+/// The fault of an exposure that came from outside; empty: none.
+std::string FaultOf(const SectorExposure& exposure, std::size_t units);
 
 struct SectorReport {
   std::uint32_t sector = 0;
@@ -123,7 +142,6 @@ struct SectorReport {
   /// there.
   DurationNs unordered;
   std::uint64_t order = 0;  // the last one that was carried out
-  bool wants_body = false;  // the present order came without
   SectorStage stage = SectorStage::kIdle;
   PlaneConfigurationId configuration;  // the one under way
   std::uint64_t change = 0;            // PlaneOrder::change of it, carried out
@@ -142,8 +160,10 @@ struct SectorReport {
     HostInstant returned;  // by the sector's clock
   };
   std::optional<Echo> echo = {};
-  std::shared_ptr<const SectorJob> body = {};       // null: the coordinator has it
-  std::shared_ptr<const SectorPlaces> places = {};  // null: the same
+  std::shared_ptr<const SectorJob> body = {};  // null: the coordinator has it
+  std::uint64_t places_now = 0;  // DigestOf the present places; 0: it does not rest, or not yet
+  std::shared_ptr<const SectorPlaces> places = {};      // null: the coordinator has them
+  std::shared_ptr<const SectorExposure> exposure = {};  // null: the same
 };
 
 /// How far a sector is with a round, for its neighbours.

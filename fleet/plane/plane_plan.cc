@@ -104,6 +104,7 @@ PlaneJob MakePlaneJob(std::uint64_t job, const PlaneLayout& plane,
     made.sector_jobs.push_back(sector == nullptr ? 0 : sector->job);
     if (sector == nullptr) continue;
     options.fixed |= sector->fixed;
+    options.leave_stuck |= sector->leave_stuck;
     made.plan.unproven |= sector->unproven;
     options.start_skew_s = std::max(options.start_skew_s, sector->start_skew_s);
     options.notice_s = std::max(options.notice_s, sector->notice_s);

@@ -38,7 +38,12 @@ std::shared_ptr<const SectorTask> PlaneCoordinator::TaskOf(const PlaneConfigurat
     task->what = std::move(home);
     return task;
   }
+  if (configuration.kind == ConfigurationKind::kMeasure) {
+    task->what = MeasureCommand{};
+    return task;
+  }
   ApplyCommand apply{.source = configuration.source, .targets = {}, .fixed = configuration.fixed};
+  apply.measure = configuration.measure;
   for (const PositionerIndex i : plane_.own(sector)) {
     apply.targets.push_back(configuration.targets[i.value]);
     if (!configuration.target_ids.empty())
@@ -49,6 +54,29 @@ std::shared_ptr<const SectorTask> PlaneCoordinator::TaskOf(const PlaneConfigurat
 }
 
 // ---- gathering
+
+/// The part in a plan of a sector whose units stand where they are; null: that is not sure.
+std::shared_ptr<const SectorJob> PlaneCoordinator::StandingJob(std::uint32_t sector) const {
+  if (!sectors_.IsUsable(sector)) return nullptr;
+  const SectorBook::Entry& entry = sectors_[sector];
+  const SectorReport& report = *entry.report;
+  auto job = std::make_shared<SectorJob>();
+  if (report.configuration == Id() && Looks(sector)) {
+    job->start = entry.exposure->expected;
+    job->drives = entry.exposure->drives;
+  } else if (report.configuration.number == 0 && report.last_over == Id() &&
+             report.stage == SectorStage::kIdle && entry.places != nullptr &&
+             report.places_now != 0 && report.places_now == entry.places_digest) {
+    job->start = entry.places->places;
+    job->drives = entry.places->drives;
+  } else {
+    return nullptr;
+  }
+  job->targets.resize(entry.units);
+  job->frozen.assign(entry.units, 1);
+  job->offsets.resize(entry.units);
+  return job;
+}
 
 /// Orders what brings the sector to ask for a plan, and says how far it is.
 PlaneCoordinator::Readiness PlaneCoordinator::Prepare(std::uint32_t sector) {
@@ -64,19 +92,7 @@ PlaneCoordinator::Readiness PlaneCoordinator::Prepare(std::uint32_t sector) {
   }
   if (!usable) return Readiness::kAbsent;
   const SectorReport& report = *entry.report;
-  if (report.configuration == id) {
-    if (report.change < LastChangeOf(sector)) {
-      if (kept_ == record_number_) sectors_.Order(sector, RetargetsOf(sector));
-      return Readiness::kWaits;
-    }
-    if (report.round != 0 &&
-        (report.stage == SectorStage::kReady || report.stage == SectorStage::kPreparing))
-      sectors_.Order(sector,
-                     {.kind = OrderKind::kWithdraw, .configuration = id, .job = report.job});
-    const bool asks = report.stage == SectorStage::kAsking && entry.job != nullptr &&
-                      entry.job->job == report.job;
-    return asks ? Readiness::kReady : Readiness::kWaits;
-  }
+  if (report.configuration == id) return PrepareOwn(sector);
   if (report.configuration.number != 0) {
     sectors_.Order(sector, {.kind = OrderKind::kStop, .configuration = report.configuration});
     return Readiness::kWaits;
@@ -91,11 +107,32 @@ PlaneCoordinator::Readiness PlaneCoordinator::Prepare(std::uint32_t sector) {
   return Readiness::kWaits;
 }
 
+/// The sector has the configuration under way.
+PlaneCoordinator::Readiness PlaneCoordinator::PrepareOwn(std::uint32_t sector) {
+  const SectorBook::Entry& entry = sectors_[sector];
+  const SectorReport& report = *entry.report;
+  if (report.change < LastChangeOf(sector)) {
+    if (kept_ == record_number_) sectors_.Order(sector, RetargetsOf(sector));
+    return Readiness::kWaits;
+  }
+  if (report.stage == SectorStage::kLooking)
+    return Looks(sector) ? Readiness::kLooks : Readiness::kWaits;
+  if (report.round != 0 &&
+      (report.stage == SectorStage::kReady || report.stage == SectorStage::kPreparing))
+    sectors_.Order(sector,
+                   {.kind = OrderKind::kWithdraw, .configuration = Id(), .job = report.job});
+  const bool asks =
+      report.stage == SectorStage::kAsking && entry.job != nullptr && entry.job->job == report.job;
+  return asks ? Readiness::kReady : Readiness::kWaits;
+}
+
 void PlaneCoordinator::Gather() {
   std::vector<std::uint32_t> ready;
   std::string awaited;
   bool moves = false;
-  bool settling = false;  // some sector takes part and is not ready yet
+  bool looks = false;
+  bool looks_first = false;  // units of unknown place are to be found before any unit moves
+  bool settling = false;     // some sector takes part and is not ready yet
   for (std::uint32_t sector = 0; sector < sectors_.size(); ++sector) {
     switch (Prepare(sector)) {
       case Readiness::kReady:
@@ -103,6 +140,10 @@ void PlaneCoordinator::Gather() {
         break;
       case Readiness::kMoves:
         moves = true;
+        break;
+      case Readiness::kLooks:
+        looks = true;
+        looks_first |= sectors_[sector].exposure->first;
         break;
       case Readiness::kOver:
         // A sector that was stopped where it is: nothing moves until an operator applies again.
@@ -125,6 +166,7 @@ void PlaneCoordinator::Gather() {
   view_.state = ConfigurationState::kPlanning;
   view_.waiting_for = awaited;
   if (!awaited.empty() && now_ < since_ + times_.gather_patience) return;
+  if (looks && (looks_first || ready.empty())) return Look();
   if (!ready.empty()) return Plan(ready, settling);
   if (awaited.empty()) End(ConfigurationState::kDone);  // all sectors have ended it
 }
@@ -136,6 +178,10 @@ void PlaneCoordinator::Plan(const std::vector<std::uint32_t>& ready, bool settli
     jobs[sector] = sectors_[sector].job;
     parts_[sector] = {sectors_[sector].report->incarnation, jobs[sector]->job};
   }
+  // Sectors that have ended the configuration, or wait for an exposure, stand, and others may move
+  // beside them: no order but this coordinator's can move their units while they follow it.
+  for (std::uint32_t sector = 0; sector < sectors_.size(); ++sector)
+    if (jobs[sector] == nullptr) jobs[sector] = StandingJob(sector);
   PlaneJob job = MakePlaneJob(++job_, plane_, jobs, times_.border_notice.seconds(),
                               times_.clock_allowance.seconds());
   strip_.assign(plane_.layout().size(), 0);
@@ -269,16 +315,21 @@ void PlaneCoordinator::Finish(const std::string& failure, const PlanePlan* plan)
 }
 
 void PlaneCoordinator::Finishing() {
+  bool looks = false;
   for (std::uint32_t sector = 0; sector < sectors_.size(); ++sector) {
+    if (sectors_.IsUsable(sector)) looks |= Looks(sector);
     if (parts_[sector].job == 0 || !sectors_.IsUsable(sector)) continue;
     const SectorReport& report = *sectors_[sector].report;
     if (report.incarnation != parts_[sector].incarnation) continue;
-    if (report.configuration != Id()) continue;  // it has ended
+    if (report.configuration != Id() || Looks(sector)) continue;  // its part is over
     // A unit failed meanwhile, and the sector asks anew.
     if (report.stage == SectorStage::kAsking && report.job != parts_[sector].job)
       return Enter(PlanePhase::kGathering);
-    if (now_ < since_ + times_.finish_patience) return;
+    // Before an exposure arrivals become durable, and sensors are read.
+    const bool measures = record_.under_way->measure.has_value();
+    if (now_ < since_ + (measures ? times_.round_patience : times_.finish_patience)) return;
   }
+  if (looks) return Enter(PlanePhase::kGathering);
   End(end_);
 }
 

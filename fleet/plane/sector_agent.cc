@@ -72,9 +72,11 @@ void SectorAgent::Hear(const PlaneOrder& order) {
   if (order.incarnation != 0 && order.incarnation != incarnation_) return;
   job_seen_ = order.job_seen;
   places_.seen = order.places_seen;
+  exposure_seen_ = order.exposure_seen;
   const bool newer = !order_ || order.number > order_->number;
   const bool same = order_ && order.number == order_->number;
-  if (newer || (same && (order.task != nullptr || order.round_body != nullptr))) {
+  if (newer || (same && (order.task != nullptr || order.round_body != nullptr ||
+                         order.findings != nullptr))) {
     order_ = order;
   } else if (same) {
     order_->ahead = order.ahead;
@@ -95,12 +97,30 @@ void SectorAgent::Follow() {
             .to_home = in.job->to_home,
             .unproven = in.job->unproven,
             .fixed = in.job->options.fixed,
+            .leave_stuck = in.job->options.leave_stuck,
             .start_skew_s = in.job->options.start_skew_s,
             .notice_s = in.job->options.notice_s};
     job_ = std::move(job);
     said_.changed = true;
   }
-  if (in.places != nullptr) {
+  if (in.exposure != nullptr) {
+    auto exposure = std::make_shared<SectorExposure>();
+    *exposure = {.id = in.exposure->id,
+                 .first = in.view.looks_first,
+                 .expected = in.exposure->expected,
+                 .before = in.exposure->before,
+                 .reported = in.exposure->reported,
+                 .seen = in.exposure->seen,
+                 .wanted = in.exposure->wanted,
+                 .tolerance_um = in.exposure->tolerance_um,
+                 .drives = {in.drives.begin(), in.drives.end()}};
+    exposure_ = std::move(exposure);
+    said_.changed = true;
+  }
+  if (in.view.stage != SectorStage::kIdle) {  // places of before are none any more
+    places_.now.reset();
+    places_.digest = 0;
+  } else if (in.places != nullptr) {
     places_.now = in.places;
     places_.digest = DigestOf(*in.places);
   }
@@ -151,6 +171,7 @@ void SectorAgent::Obey() {
   done_ = order_->number;
   order_->task.reset();
   order_->round_body.reset();
+  order_->findings.reset();
   said_.changed = true;
 }
 
@@ -186,6 +207,8 @@ bool SectorAgent::Do(const PlaneOrder& order) {
       return true;
     case OrderKind::kRetarget:
       return Retarget(order);
+    case OrderKind::kFindings:
+      return TakeFindings(order);
   }
   return true;
 }
@@ -211,6 +234,15 @@ bool SectorAgent::Retarget(const PlaneOrder& order) {
     if (retarget.number > here_.change) command.targets.push_back(retarget.target);
   here_.change = std::max(here_.change, order.change);
   if (!command.targets.empty()) Send(std::move(command));
+  return true;
+}
+
+bool SectorAgent::TakeFindings(const PlaneOrder& order) {
+  if (in_->view.stage != SectorStage::kLooking || exposure_ == nullptr ||
+      exposure_->id != order.job)
+    return true;
+  if (order.findings == nullptr) return false;
+  Send(SectorFindings{order.job, *order.findings});
   return true;
 }
 
@@ -354,7 +386,6 @@ SectorReport SectorAgent::Report() const {
                       .accepted = accepted_,
                       .unordered = ordered_at_ ? in.now - *ordered_at_ : kUnorderedMost,
                       .order = done_,
-                      .wants_body = order_ && order_->number > done_,
                       .stage = in.view.stage,
                       .configuration = here_.now,
                       .change = here_.change,
@@ -373,8 +404,12 @@ SectorReport SectorAgent::Report() const {
   if (in.view.stage == SectorStage::kAsking && job_ != nullptr && job_->job == in.view.job &&
       job_seen_ != job_->job)
     report.body = job_;
+  report.places_now = places_.digest;
   if (in.view.stage == SectorStage::kIdle && places_.seen != places_.digest)
     report.places = places_.now;
+  if (in.view.stage == SectorStage::kLooking && exposure_ != nullptr &&
+      exposure_seen_ != exposure_->id)
+    report.exposure = exposure_;
   return report;
 }
 

@@ -65,7 +65,8 @@ struct AgentInputs {
   SectorView view;
   const ConfigurationView* configuration = nullptr;
   const PlanJob* job = nullptr;            // of this step, if any
-  std::span<const UnitDrive> drives = {};  // with `job`
+  const ExposureJob* exposure = nullptr;   // the same
+  std::span<const UnitDrive> drives = {};  // with `job` and `exposure`
   /// Given now and then while nothing is under way; null: not now.
   std::shared_ptr<const SectorPlaces> places = {};
   std::span<const ReplyEffect> replies = {};
@@ -133,6 +134,7 @@ class SectorAgent {
   [[nodiscard]] bool Configure(const PlaneOrder& order);
   [[nodiscard]] bool TakeRound(const PlaneOrder& order);
   [[nodiscard]] bool Retarget(const PlaneOrder& order);
+  [[nodiscard]] bool TakeFindings(const PlaneOrder& order);
   void Confirm();
   [[nodiscard]] std::string WhoIsMissing() const;
   void GiveBack(const std::string& why);
@@ -185,6 +187,8 @@ class SectorAgent {
     std::uint64_t seen = 0;
   };
   Places places_;
+  std::shared_ptr<const SectorExposure> exposure_;
+  std::uint64_t exposure_seen_ = 0;
   Said said_;
   const AgentInputs* in_ = nullptr;  // of the present step
   AgentEffects* out_ = nullptr;      // of the present step

@@ -50,6 +50,7 @@ void SectorBook::Hear(const SectorReport& report, HostInstant now) {
   if (!entry.report || entry.report->incarnation != report.incarnation) {
     entry.clock.Forget();
     entry.job.reset();
+    entry.exposure.reset();
   }
   if (report.echo)
     entry.clock.Add({report.echo->sent, report.echo->received, report.echo->returned, now});
@@ -60,9 +61,12 @@ void SectorBook::Hear(const SectorReport& report, HostInstant now) {
     entry.places = report.places;
     entry.places_digest = DigestOf(*report.places);
   }
+  if (report.exposure != nullptr && FaultOf(*report.exposure, entry.units).empty())
+    entry.exposure = report.exposure;
   entry.report = report;
   entry.report->body.reset();
   entry.report->places.reset();
+  entry.report->exposure.reset();
   entry.heard = now;
 }
 
@@ -132,12 +136,14 @@ HostInstant SectorBook::Say(HostInstant now, std::vector<PlaneOrder>* orders) {
       if (IsDone(sector) || !body_due) {
         order.task.reset();
         order.round_body.reset();
+        order.findings.reset();
       } else {
         entry.body_said = now;
       }
       order.sent = now;
       if (const auto clock = entry.clock.At(now)) order.ahead = clock->ahead;
       order.places_seen = entry.places_digest;
+      order.exposure_seen = entry.exposure == nullptr ? 0 : entry.exposure->id;
       order.job_seen = entry.job == nullptr ? 0 : entry.job->job;
       orders->push_back(std::move(order));
       entry.said = now;

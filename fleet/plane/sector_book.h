@@ -54,8 +54,9 @@ class SectorBook {
     std::shared_ptr<const SectorJob> job;        // the last that came, of this life of the sector
     std::shared_ptr<const SectorPlaces> places;  // the last that came, of any life
     std::uint64_t places_digest = 0;
-    std::string trouble;       // why it cannot take part; empty: it can
-    std::uint64_t digest = 0;  // DigestOf its part of the layout
+    std::shared_ptr<const SectorExposure> exposure;  // the last that came, of this life
+    std::string trouble;                             // why it cannot take part; empty: it can
+    std::uint64_t digest = 0;                        // DigestOf its part of the layout
     std::size_t units = 0;
     PlaneOrder order;  // the present one; number 0: none yet
     HostInstant said{INT64_MIN};

@@ -28,6 +28,17 @@ std::vector<focalfleet::Unit> Strips(std::uint32_t sectors, std::uint32_t units_
   return units;
 }
 
+/// The places of all units, as the seat of a sector gives them; null: something is under way.
+std::shared_ptr<const SectorPlaces> PlacesOf(const PlaneInProcess::Sector& sector) {
+  if (sector.coordinator->sector().stage != SectorStage::kIdle) return nullptr;
+  auto places = std::make_shared<SectorPlaces>();
+  const auto drives = sector.coordinator->drives();
+  places->drives.assign(drives.begin(), drives.end());
+  for (std::uint32_t n = 0; n < drives.size(); ++n)
+    places->places.push_back(sector.coordinator->unit({n}).knowledge);
+  return places;
+}
+
 }  // namespace
 
 PlaneInProcess::PlaneInProcess(const Options& options)
@@ -43,7 +54,8 @@ PlaneInProcess::PlaneInProcess(const Options& options)
   drives_.assign(layout.size(), UnitDrive{});
   const auto start = DrawConfiguration(layout, drives_, {}, Rng::Stream(options.seed, "start"));
   FOCALFLEET_CHECK(start.has_value());
-  sim::WorldConfig config{.units = DescribeUnits(layout), .seed = options.seed, .faults = {}};
+  sim::WorldConfig config{
+      .units = DescribeUnits(layout), .seed = options.seed, .spread = options.spread, .faults = {}};
   for (std::uint32_t n = 0; n < layout.size(); ++n)
     for (const Axis axis : kAxes)
       config.units[n].axis[Index(axis)].angle_deg =
@@ -67,7 +79,10 @@ PlaneInProcess::PlaneInProcess(const Options& options)
     for (const BusId bus : sector.layout->buses()) sector.controllers.emplace_back(bus);
     StartSector(n);
   }
-  for (Plane& plane_node : planes) plane_node.ahead = ahead();
+  for (Plane& plane_node : planes) {
+    plane_node.ahead = ahead();
+    plane_node.camera = DelayedCamera(options.camera);
+  }
   StartPlane(0);
 }
 
@@ -96,6 +111,7 @@ void PlaneInProcess::StartSector(std::uint32_t which) {
   if (sector.coordinator != nullptr) return;
   CoordinatorConfig config;
   config.in_plane = true;
+  config.has_camera = true;  // the plane's
   sector.coordinator = std::make_unique<Coordinator>(sector.layout.get(), sector.drives, config,
                                                      sector.storage.memory().fleet);
   SectorAgentConfig agent = options_.agent;
@@ -111,6 +127,7 @@ void PlaneInProcess::KillPlane(std::uint32_t which) {
   at.coordinator.reset();
   at.keep.reset();
   at.job.reset();
+  at.camera.Restart();
   at.reports.clear();
   at.commands.clear();
 }
@@ -170,7 +187,9 @@ void PlaneInProcess::TurnSector(std::uint32_t which) {
                       .view = sector.coordinator->sector(),
                       .configuration = &sector.coordinator->configuration(),
                       .job = sector.last.plan_job ? &*sector.last.plan_job : nullptr,
+                      .exposure = sector.last.exposure ? &*sector.last.exposure : nullptr,
                       .drives = sector.coordinator->drives(),
+                      .places = PlacesOf(sector),
                       .replies = sector.last.replies,
                       .ends = sector.last.border_ends},
                      &agent);
@@ -209,8 +228,8 @@ void PlaneInProcess::TurnSector(std::uint32_t which) {
   sector.storage.Put(now_, sector.last);
   for (const OutFrame& out : sector.last.frames) world_->Inject(out.bus, out.frame, now_);
   const Effects& last = sector.last;
-  const bool again = !agent.commands.empty() || last.plan_job || !last.replies.empty() ||
-                     !last.border_ends.empty();
+  const bool again = !agent.commands.empty() || last.plan_job || last.exposure ||
+                     !last.replies.empty() || !last.border_ends.empty();
   const HostInstant wake = std::min(last.wake_at, agent.wake_at);
   sector.wake = again ? now_ : wake == kNever ? kNever : now_ + (wake - now);
 }
@@ -229,12 +248,15 @@ void PlaneInProcess::TurnPlane(std::uint32_t which) {
     plans.push_back(RunPlaneJob(*std::exchange(at.job, {}), *layout_));
     due = true;
   }
+  const auto exposures = at.camera.TakeDue(now_, layout_->layout(), drives_, *world_);
+  due = due || !exposures.empty();
   if (!due) return;
   PlaneEffects effects;
   at.coordinator->Step({.now = now,
                         .reports = at.reports,
                         .commands = at.commands,
                         .plans = plans,
+                        .exposures = exposures,
                         .kept = at.kept_number},
                        &effects);
   at.reports.clear();
@@ -245,6 +267,7 @@ void PlaneInProcess::TurnPlane(std::uint32_t which) {
     at.job = std::move(effects.job);
     at.job_due = now_ + options_.plan_delay;
   }
+  if (effects.exposure) at.camera.Put(now_, effects.exposure->job);
   if (effects.record) {
     at.keep = std::move(effects.record);
     at.keep_number = effects.record_number;
@@ -303,6 +326,7 @@ HostInstant PlaneInProcess::Next() const {
     next = std::min(next, at.wake);
     if (at.keep) next = std::min(next, at.keep_at);
     if (at.job) next = std::min(next, at.job_due);
+    next = std::min(next, at.camera.due());
     if (!at.commands.empty()) next = now_;
   }
   return next;

@@ -32,8 +32,10 @@ class PlaneInProcess {
     double drift_most = 40e-6;
     DurationNs commit_delay = Milliseconds(5);
     DurationNs plan_delay = Milliseconds(100);
+    DelayedCamera::Options camera{.delay = Milliseconds(500)};  // of each coordinator
     PlaneTimes times;
     SectorAgentConfig agent;
+    sim::Spread spread = sim::Spread::kNominal;
   };
   /// Nodes of the network: sectors from 0 on, then the coordinators.
   struct Sector {
@@ -70,6 +72,7 @@ class PlaneInProcess {
     std::vector<PlaneCommand> commands;
     std::optional<PlaneJob> job;
     HostInstant job_due = kNever;
+    DelayedCamera camera{{}};
     std::vector<ReplyEffect> replies;  // all
     std::vector<std::string> log;      // all
     std::vector<ShellNote> notes;      // all

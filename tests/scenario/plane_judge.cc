@@ -12,6 +12,8 @@ using Point = std::complex<double>;
 
 // At rest the rotor lags its field by 4 vectors of 96; two more are for rounding.
 constexpr double kLagVectors = 6;
+// A measured offset has the lag of the way before it; the next way may come from the other side.
+constexpr double kMeasuredLagVectors = 10;
 constexpr DurationNs kLook = Milliseconds(10);
 // SectorAgentConfig::confirm_fresh, and a word under way.
 constexpr DurationNs kWindow = Milliseconds(110);
@@ -168,9 +170,11 @@ void PlaneJudge::LookAtStores() {
     for (const Axis axis : kAxes) {
       const AxisKnowledge& known = row->knowledge[Index(axis)];
       const double at = truth.vectors[Index(axis)];
-      if (known.witness != Witness::kUnknown &&
-          (at < known.low - kLagVectors || at > known.high + kLagVectors))
-        Broken("place", name + " is not where its store has it");
+      const double lag = row->offset == Pose{} ? kLagVectors : kMeasuredLagVectors;
+      if (known.witness != Witness::kUnknown && (at < known.low - lag || at > known.high + lag))
+        Broken("place", name + " is not where its store has it: " + std::to_string(at) +
+                            ", stored " + std::to_string(known.low) + " to " +
+                            std::to_string(known.high));
     }
   }
 }
@@ -180,8 +184,10 @@ void PlaneJudge::LookAtArrivals(const std::vector<std::optional<Pose>>& targets)
   for (std::uint32_t n = 0; n < targets.size(); ++n) {
     const sim::UnitTruth truth = plane_.world().Truth(n);
     bool at = targets[n].has_value();
+    const UnitView& view = plane_.unit({n});
+    const double lag = view.offset == Pose{} ? kLagVectors : kMeasuredLagVectors;
     for (const Axis axis : kAxes)
-      at = at && std::abs(truth.vectors[Index(axis)] - (*targets[n])[Index(axis)]) <= kLagVectors;
+      at = at && std::abs(truth.vectors[Index(axis)] - (*targets[n])[Index(axis)]) <= lag;
     there += at ? 1u : 0u;
   }
   const OutcomeCounts& counts = plane_.plane().view().counts;

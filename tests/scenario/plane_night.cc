@@ -59,8 +59,11 @@ class Night {
       Broken("no coordinator takes charge");
     const auto first = plane_.DrawTargets(2 * options_.seed);
     const bool homes = !options_.fault && tasks_.Uniform() < 0.25;
+    const bool measures = !options_.fault && !homes && tasks_.Uniform() < 0.25;
     if (homes)
       plane_.Give(PlaneHomeCommand{DrawUnits(), false});
+    else if (measures)
+      plane_.Give(PlaneApplyCommand{"test", false, first, {}, ApplyCommand::Measure{1, 10, false}});
     else
       plane_.Apply(first);
     armed_ = true;
@@ -71,7 +74,8 @@ class Night {
     if (retargets && plane_.planes[0].coordinator != nullptr) Retarget();
     plane_.Run(Seconds(lasts_s - retargets_after_s));
     // Counts of a configuration are history where another coordinator has moved units since.
-    if (plane_.IsIdle() && !second_ && !homes && !retargets) judge_.LookAtArrivals(first);
+    if (plane_.IsIdle() && !second_ && !homes && !retargets && !measures)
+      judge_.LookAtArrivals(first);
     Heal();
     const auto second = plane_.DrawTargets(2 * options_.seed + 1);
     Converge(second);

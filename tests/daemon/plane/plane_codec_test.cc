@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "protocol/base/limits.h"
 #include "protocol/base/rng.h"
 
@@ -43,6 +45,22 @@ PlaneOrder AHomingOrder() {
   return order;
 }
 
+PlaneOrder AFindingsOrder() {
+  PlaneOrder order = AnOrder();
+  order.kind = OrderKind::kFindings;
+  order.round_body.reset();
+  ExposureFindings findings{.id = 12, .measurements = {}};
+  findings.measurements.push_back({.unit = {3},
+                                   .status = MeasurementStatus::kMeasured,
+                                   .other = {},
+                                   .x_mm = 1.5,
+                                   .y_mm = -2,
+                                   .covariance = RoundCovariance(2),
+                                   .place = Pose{5, 6}});
+  order.findings = std::make_shared<const Result<ExposureFindings>>(std::move(findings));
+  return order;
+}
+
 SectorReport AReport() {
   SectorReport report{.sector = 1, .incarnation = 3, .number = 8, .accepted = {4, 77}};
   report.stage = SectorStage::kAsking;
@@ -60,6 +78,15 @@ SectorReport AReport() {
   places->places.resize(2);
   places->drives.resize(2);
   report.places = places;
+  auto exposure = std::make_shared<SectorExposure>();
+  exposure->id = 4;
+  exposure->expected.resize(2);
+  exposure->before = {Pose{7, 8}, std::nullopt};
+  exposure->reported.resize(2);
+  exposure->seen = {0, 1};
+  exposure->wanted = {1, 1};
+  exposure->drives.resize(2);
+  report.exposure = exposure;
   return report;
 }
 
@@ -89,9 +116,15 @@ TEST(PlaneCodec, MessagesComeAcrossWithEveryField) {
   ASSERT_TRUE(homes.has_value()) << homes.error().text;
   ASSERT_NE(homes->task, nullptr);
   EXPECT_EQ(std::get<HomeCommand>(homes->task->what).units.size(), 2u);
+  const auto found = DecodePlaneOrder(Encode(AFindingsOrder()));
+  ASSERT_TRUE(found.has_value()) << found.error().text;
+  ASSERT_TRUE(found->findings != nullptr && found->findings->has_value());
+  EXPECT_EQ((*found->findings)->measurements[0].place, (Pose{5, 6}));
   const auto report = DecodeSectorReport(Encode(AReport()));
   ASSERT_TRUE(report.has_value()) << report.error().text;
   EXPECT_EQ(Encode(*report), Encode(AReport()));
+  EXPECT_EQ(FaultOf(*report->exposure, 2), "");
+  EXPECT_NE(FaultOf(*report->exposure, 3), "");
   const auto news = DecodeBorderNews(Encode(SomeNews()));
   ASSERT_TRUE(news.has_value()) << news.error().text;
   EXPECT_EQ(Encode(*news), Encode(SomeNews()));
@@ -99,7 +132,7 @@ TEST(PlaneCodec, MessagesComeAcrossWithEveryField) {
 
 TEST(PlaneCodec, RefusesCodesAndListsBeyondTheirLimits) {
   PlaneOrder order = AnOrder();
-  order.kind = static_cast<OrderKind>(7);
+  order.kind = static_cast<OrderKind>(8);
   EXPECT_FALSE(DecodePlaneOrder(Encode(order)).has_value());
   order = AnOrder();
   order.sector = limits::kSectors;
@@ -112,6 +145,11 @@ TEST(PlaneCodec, RefusesCodesAndListsBeyondTheirLimits) {
   EXPECT_FALSE(DecodePlaneOrder(Encode(order)).has_value());
   order = AnOrder();
   order.sent = HostInstant{INT64_MIN};
+  EXPECT_FALSE(DecodePlaneOrder(Encode(order)).has_value());
+  order = AFindingsOrder();
+  ExposureFindings findings = **order.findings;
+  findings.measurements[0].x_mm = std::numeric_limits<double>::quiet_NaN();
+  order.findings = std::make_shared<const Result<ExposureFindings>>(findings);
   EXPECT_FALSE(DecodePlaneOrder(Encode(order)).has_value());
   SectorReport report = AReport();
   report.stage = static_cast<SectorStage>(kSectorStageCount);
@@ -128,7 +166,8 @@ TEST(PlaneCodec, RefusesCodesAndListsBeyondTheirLimits) {
 TEST(PlaneCodec, AnyBytesAreAMessageOrAnError) {
   Rng rng(1);
   for (const std::string& whole :
-       {Encode(AnOrder()), Encode(AHomingOrder()), Encode(AReport()), Encode(SomeNews())}) {
+       {Encode(AnOrder()), Encode(AHomingOrder()), Encode(AFindingsOrder()), Encode(AReport()),
+        Encode(SomeNews())}) {
     for (std::size_t n = 0; n < whole.size(); ++n) {
       const std::string cut = whole.substr(0, n);
       EXPECT_FALSE(DecodePlaneOrder(cut).has_value() && DecodeSectorReport(cut).has_value());

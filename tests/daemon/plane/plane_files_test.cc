@@ -46,10 +46,15 @@ TEST(PlaneRecordFile, KeepsTheConfigurationUnderWay) {
   record.under_way->target_ids.resize(20);
   record.under_way->targets[4] = Pose{-100, 2000};
   record.under_way->target_ids[4] = "star";
+  record.under_way->changes.emplace(3, PositionerIndex{4});
+  record.under_way->measure = ApplyCommand::Measure{2, 7.5, false};
   record.last = PlaneConfiguration{.id = 7, .source = "before", .targets = {}};
   record.last->targets.resize(20);
   record.last->target_ids.resize(20);
   record.last->targets[9] = Pose{3, 4};
+  record.last->kind = ConfigurationKind::kHome;
+  record.last->to_home = {{2}, {5}};
+  record.last->unproven = true;
   record.last_state = ConfigurationState::kStopped;
   {
     auto file = PlaneRecordFile::Open(path, layout, 1234);
@@ -84,6 +89,12 @@ TEST(PlaneRecordFile, RefusesWhatIsNone) {
        "\"s\",\"fixed\":false,\"targets\":[[1,18446744073709551615,1,\"\"]]}}",
        "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
        "\"s\",\"fixed\":false,\"targets\":[[4294967297,1,1,\"\"]]}}",
+       "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
+       "\"s\",\"fixed\":false,\"targets\":[],\"kind\":\"home\",\"to_home\":[999]}}",
+       "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
+       "\"s\",\"fixed\":false,\"targets\":[],\"kind\":\"apply\",\"changes\":[[1,2]]}}",
+       "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"under_way\":{\"id\":1,\"source\":"
+       "\"s\",\"fixed\":false,\"targets\":[],\"kind\":\"apply\",\"measure\":{\"corrections\":-1}}}",
        "{\"coordinator\":1,\"epoch\":2,\"next_configuration\":1,\"last\":{\"id\":1,\"source\":"
        "\"s\","
        "\"fixed\":false,\"targets\":[]},\"last_state\":\"moving\"}"}) {
