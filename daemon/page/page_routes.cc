@@ -81,11 +81,11 @@ void AddPageRoutes(const PageParts& parts, HttpRouter* router) {
                    return HttpAnswer{.content_type = std::string(asset.type),
                                      .body = std::string(asset.text)};
                  }});
-  router->Add({.path = "/layout",
-               .verb = "status",
-               .answer = [layout = parts.layout](const HttpRequest&, const Caller&) {
-                 return HttpAnswer{.content_type = "application/json", .body = LayoutJson(*layout)};
-               }});
+  router->Add(
+      {.path = "/layout", .verb = "status", .answer = [parts](const HttpRequest&, const Caller&) {
+         return HttpAnswer{.content_type = "application/json",
+                           .body = LayoutJson(*parts.layout, parts.sectors)};
+       }});
   router->Add(
       {.path = "/stream",
        .verb = "status",
@@ -105,7 +105,8 @@ void AddPageRoutes(const PageParts& parts, HttpRouter* router) {
                .answer = [night = parts.night](const HttpRequest& request, const Caller&) {
                  return PowerOfPreview(*night, request);
                }});
-  AddDiagnosisRoutes(parts.diagnosis, {parts.store, parts.layout}, router);
+  if (parts.diagnosis != nullptr)
+    AddDiagnosisRoutes(parts.diagnosis, {parts.store, parts.layout}, router);
   router->Add({.path = "/curves",
                .verb = "status",
                .answer = [night = parts.night](const HttpRequest& request, const Caller&) {

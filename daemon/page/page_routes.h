@@ -4,6 +4,8 @@
 // core. Everything else that the page does goes through the verbs of /api (http/api_routes.h).
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <string>
 
 #include "daemon/http/router.h"
@@ -18,11 +20,12 @@ namespace focalfleet {
 /// The parts that the page shows. All outlive the router.
 struct PageParts {
   const Layout* layout = nullptr;
+  std::span<const std::uint32_t> sectors = {};  // of each unit of a plane; empty: a daemon's own
   PlateFeed* feed = nullptr;
   const KeptPlans* plans = nullptr;
   const NightCurves* night = nullptr;
-  DiagnosisJob* diagnosis = nullptr;
-  std::string store;  // its file
+  DiagnosisJob* diagnosis = nullptr;  // null: nothing is diagnosed here
+  std::string store;                  // its file
 };
 
 void AddPageRoutes(const PageParts& parts, HttpRouter* router);

@@ -26,7 +26,7 @@ nlohmann::json ColumnOf(const Layout& layout, ValueOf value_of) {
 
 }  // namespace
 
-std::string LayoutJson(const Layout& layout) {
+std::string LayoutJson(const Layout& layout, std::span<const std::uint32_t> sectors) {
   nlohmann::json units;
   const auto add = [&](const char* name, auto value_of) {
     units[name] = ColumnOf(layout, value_of);
@@ -42,6 +42,8 @@ std::string LayoutJson(const Layout& layout) {
   add("bus", [](const Unit& unit) { return unit.bus.value; });
   add("node", [](const Unit& unit) { return unit.node.value; });
   add("rail", [](const Unit& unit) { return unit.rail.value; });
+  if (!sectors.empty())
+    units["sector"] = std::vector<std::uint32_t>(sectors.begin(), sectors.end());
   nlohmann::json obstacles = nlohmann::json::array();
   for (const Obstacle& obstacle : layout.obstacles())
     obstacles.push_back({{"id", obstacle.id},

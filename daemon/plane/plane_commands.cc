@@ -122,6 +122,22 @@ Result<PlaneHomeCommand> PlaneHomeOf(const PlaneInstant& plane, const Json& args
   return command;
 }
 
+/// Why the unit cannot go anywhere now; empty: it can, as far as it alone is concerned.
+std::string WhyNotNow(const PlaneInstant& plane, PositionerIndex i) {
+  const std::uint32_t sector = plane.plane->SectorOf(i);
+  const SectorBook& book = plane.coordinator->sectors();
+  if (!book.IsUsable(sector)) return NameOfSector(sector) + " " + book[sector].trouble;
+  for (const std::uint32_t beyond : plane.plane->beyond(i))
+    if (!book.IsUsable(beyond)) return "a sector in its reach takes no part";
+  const UnitStatusValue* unit = plane.table->unit(i);
+  if (unit == nullptr || plane.table->IsSilent(sector, plane.steady)) return "it is not heard";
+  if (!unit->enabled) return "disabled";
+  if (unit->phase != UnitPhase::kReady) return std::string("it is ") + Name(unit->phase);
+  if (!IsPlace(book[sector].places->places[plane.plane->Local(i).value]))
+    return "its place is not known";
+  return {};
+}
+
 template <class T>
 Result<PlaneCommand> AsCommand(Result<T> what) {
   if (!what) return tl::unexpected<Error>(std::move(what).error());
@@ -129,6 +145,37 @@ Result<PlaneCommand> AsCommand(Result<T> what) {
 }
 
 }  // namespace
+
+Result<PlanePreview> PlanePreviewOf(const PlaneInstant& plane, const Json& args) {
+  if (plane.coordinator->busy())
+    return Fail(ErrorCode::kRefused, "configuration " +
+                                         std::to_string(plane.coordinator->view().configuration) +
+                                         " is under way: stop it or wait until it ends");
+  FOCALFLEET_TRY_ASSIGN(const PlaneApplyCommand command, PlaneApplyOf(plane, args));
+  const Standing standing = StandingOf(plane);
+  PlanePreview made{.preview = {.job = {.purpose = PlanPurpose::kPreview,
+                                        .start = standing.places,
+                                        .targets = {},
+                                        .frozen = {},
+                                        .offsets = {},
+                                        .options = {}},
+                                .refused = {}},
+                    .drives = standing.drives};
+  PlanJob& job = made.preview.job;
+  job.options = plane.options;
+  job.options.fixed = command.fixed;
+  job.offsets.resize(standing.places.size());
+  for (std::uint32_t n = 0; n < standing.places.size(); ++n) {
+    std::string why = WhyNotNow(plane, {n});
+    const std::optional<Pose>& target = command.targets[n];
+    job.frozen.push_back(why.empty() ? 0 : 1);
+    job.targets.push_back(why.empty() ? target : std::nullopt);
+    if (!target) continue;
+    ++made.preview.targeted;
+    if (!why.empty()) made.preview.refused.push_back({{n}, std::move(why)});
+  }
+  return made;
+}
 
 bool IsPlaneCommand(const std::string& verb) {
   return verb == "apply" || verb == "home" || verb == "retarget" || verb == "stop" ||

@@ -4,6 +4,8 @@
 // places and drives of all units as their sectors last reported them, before anything happens.
 #pragma once
 
+#include <string>
+
 #include "daemon/control/messages.h"
 #include "daemon/plane/plane_requests.h"
 #include "fleet/plane/plane_coordinator.h"
@@ -17,5 +19,8 @@ bool IsPlaneCommand(const std::string& verb);
 /// Pre: IsPlaneCommand; `plane` has a table. Errors: kInvalid or kRefused, with a text for people;
 /// nothing has happened then.
 Result<PlaneCommand> PlaneCommandOf(const PlaneInstant& plane, const ControlRequest& request);
+
+/// Nothing changes. Pre: as above. Errors: those of `apply`.
+Result<PlanePreview> PlanePreviewOf(const PlaneInstant& plane, const Json& args);
 
 }  // namespace focalfleet

@@ -40,11 +40,15 @@ ConfigurationProgressValue ProgressOf(const PlaneInstant& plane) {
   const PlaneView& of_plane = plane.coordinator->view();
   ConfigurationView view;
   view.id = of_plane.configuration;
+  view.kind = of_plane.kind;
   view.source = of_plane.source;
   view.state = of_plane.state;
   view.round = of_plane.rounds;
   view.counts = of_plane.counts;
   view.makespan_predicted_s = of_plane.makespan_predicted_s;
+  view.waiting_for = of_plane.waiting_for;
+  view.measured = of_plane.measured;
+  view.not_measured = of_plane.not_measured;
   return {.at = plane.at, .view = view};
 }
 
@@ -53,8 +57,9 @@ ConfigurationProgressValue ProgressOf(const PlaneInstant& plane) {
 /// The table, and the thread that fills it.
 class PlaneOutput::Reader {
  public:
-  Reader(const PlaneLayout* plane, DdsOptions dds, std::function<void(const std::string&)> tell)
-      : dds_(std::move(dds)), tell_(std::move(tell)), table_(plane) {
+  Reader(const PlaneLayout* plane, DdsOptions dds, PlanePage* page,
+         std::function<void(const std::string&)> tell)
+      : dds_(std::move(dds)), page_(page), tell_(std::move(tell)), table_(plane) {
     thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
   }
   void Read(const std::function<void(const PlaneTable&)>& look) const {
@@ -93,6 +98,7 @@ class PlaneOutput::Reader {
         const std::lock_guard lock(mutex_);
         table_.Absorb(update, steady_clock::now());
       }
+      if (page_ != nullptr) page_->Take(update);
       // Status comes in many packets; what has gathered meanwhile is taken at once.
       std::this_thread::sleep_for(milliseconds(20));
     }
@@ -100,6 +106,7 @@ class PlaneOutput::Reader {
   }
 
   const DdsOptions dds_;
+  PlanePage* const page_;
   const std::function<void(const std::string&)> tell_;
   std::string trouble_;  // of the thread
   std::atomic<bool> renew_{false};
@@ -116,7 +123,7 @@ PlaneOutput::PlaneOutput(Options options) : options_(std::move(options)) {
                .tell = [this](const std::string& trouble) { options_.tell("status", trouble); }},
       .renews = !options_.dds.security.empty()});
   reader_ = std::make_unique<Reader>(
-      options_.plane, options_.dds,
+      options_.plane, options_.dds, options_.page,
       [this](const std::string& trouble) { options_.tell("status of the sectors", trouble); });
   if (!options_.metrics) return;
   options_.metrics->pages = {{"/metrics", [this] { return Metrics(); }},
@@ -136,6 +143,7 @@ void PlaneOutput::Publish(const PlaneInstant& plane) {
   batch.fleet = FleetOf(plane, options_.started);
   batch.configuration = ProgressOf(plane);
   static_cast<void>(publisher_->Publish(batch));
+  if (options_.page != nullptr) options_.page->Take(plane, *batch.fleet, *batch.configuration);
   if (server_ == nullptr) return;
   std::string page = PlaneMetricsText(plane, ReadProcessFacts());
   const std::lock_guard lock(page_mutex_);
@@ -143,7 +151,10 @@ void PlaneOutput::Publish(const PlaneInstant& plane) {
   page_at_ = plane.steady;
 }
 
-void PlaneOutput::Publish(const AlarmValue& alarm) { publisher_->Publish(alarm); }
+void PlaneOutput::Publish(const AlarmValue& alarm) {
+  publisher_->Publish(alarm);
+  if (options_.page != nullptr) options_.page->NoteAlarm();
+}
 
 void PlaneOutput::Renew(WallTime end) {
   publisher_->Renew(end);

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "daemon/http/http_server.h"
+#include "daemon/plane/plane_page.h"
 #include "daemon/plane/plane_requests.h"
 #include "daemon/plane/plane_table.h"
 #include "daemon/status/renewing_status_publisher.h"
@@ -24,6 +25,7 @@ class PlaneOutput {
     DdsOptions dds;
     WallTime started;
     std::optional<HttpServer::Options> metrics;  // none: no /metrics
+    PlanePage* page = nullptr;                   // outlives this; null: there is no page
     /// Receives each new reason why DDS does not do its part, and an empty text when it does again.
     std::function<void(const char* part, const std::string& trouble)> tell =
         [](const char*, const std::string&) {};

@@ -5,10 +5,12 @@
 #include <utility>
 
 #include "daemon/access/rights.h"
+#include "daemon/control/asker.h"
 #include "daemon/plane/plane_commands.h"
 #include "daemon/plane/plane_refusal.h"
 #include "daemon/status/status_json.h"
 #include "daemon/usage/build_version.h"
+#include "daemon/verbs/preview_json.h"
 
 namespace focalfleet {
 namespace {
@@ -40,6 +42,39 @@ Json GuaranteeJson(const PlaneView& view) {
     pairs.push_back(
         {{"ends", pair.ends.value}, {"follower", pair.follower.value}, {"at_s", pair.at_s}});
   return {{"follows_beyond", view.follows_beyond}, {"unnoticed", std::move(pairs)}};
+}
+
+/// Units that were not served, as their sectors publish them; these have the reasons.
+Json UnservedJson(const PlaneInstant& plane) {
+  Json rows = Json::array();
+  for (std::uint32_t n = 0; n < plane.plane->layout().size(); ++n) {
+    const UnitStatusValue* unit = plane.table->unit({n});
+    if (unit == nullptr || unit->outcome <= TargetOutcome::kArrived) continue;
+    const std::uint32_t sector = plane.plane->SectorOf({n});
+    const auto& report = plane.coordinator->sectors()[sector].report;
+    std::string reason = "the daemon of " + NameOfSector(sector) + " has the reason";
+    if (report && !report->door.empty()) reason += " (" + report->door + ")";
+    rows.push_back({{"unit_id", unit->unit.value},
+                    {"outcome", Name(unit->outcome)},
+                    {"reason", std::move(reason)}});
+  }
+  return rows;
+}
+
+/// The table of rights, without the verbs that a coordinator does not carry out.
+Json AccessOf(const PlaneInstant& plane, const Caller& caller) {
+  Json access = AccessJson(caller);
+  Json verbs = Json::array();
+  for (const Json& right : access["verbs"]) {
+    const auto verb = right["verb"].get<std::string>();
+    const bool asks = verb == "access" || verb == "status" || verb == "state" || verb == "wait" ||
+                      verb == "preview";
+    const bool measures = verb != "measure" || plane.has_camera;
+    if (measures && (asks || IsPlaneCommand(verb) || PlaneAlarms::IsAbout(verb)))
+      verbs.push_back(right);
+  }
+  access["verbs"] = std::move(verbs);
+  return access;
 }
 
 Json ProgressJson(const PlaneInstant& plane) {
@@ -80,8 +115,11 @@ Json PlaneStatusJson(const PlaneInstant& plane) {
   Json sectors = Json::array();
   for (std::uint32_t n = 0; n < plane.coordinator->sectors().size(); ++n)
     sectors.push_back(SectorJson(plane, n));
+  Json configuration = PlaneConfigurationJson(plane);
+  if (plane.table != nullptr) configuration["unserved"] = UnservedJson(plane);
   return {{"version", BuildVersion()},
           {"units", plane.plane->layout().size()},
+          {"page", plane.page.empty() ? Json() : Json(plane.page)},
           {"time", ToIso8601(plane.at)},
           {"busy", plane.coordinator->busy()},
           {"alarms", plane.alarms->CountsJson(plane.at)},
@@ -96,7 +134,7 @@ Json PlaneStatusJson(const PlaneInstant& plane) {
               {"received", plane.link.received},
               {"received_bytes", plane.link.received_bytes},
               {"refused", plane.link.refused}}}}},
-          {"configuration", PlaneConfigurationJson(plane)}};
+          {"configuration", std::move(configuration)}};
 }
 
 void PlaneRequests::Service(const PlaneInstant& plane, std::vector<PlaneCommand>* commands) {
@@ -121,15 +159,26 @@ void PlaneRequests::Handle(const PlaneInstant& plane, const IncomingLine& line,
   const std::string& verb = request->verb;
   if (line.reserved && verb != "stop")
     return refuse({ErrorCode::kFull, "too many clients, only stop is taken"});
-  if (const Status allowed = CheckRight(line.caller, verb, request->args); !allowed) {
+  const Result<Caller> caller = AskerOf(*request, line, options_.own_pid);
+  const Status allowed = caller ? CheckRight(*caller, verb, request->args)
+                                : Status(tl::unexpected<Error>(caller.error()));
+  if (!allowed) {
     options_.log(verb + " refused: " + allowed.error().text);
     return refuse(allowed.error());
   }
-  if (verb == "access") return Answer(pending, AccessJson(line.caller));
-  if (verb == "status") return Answer(pending, PlaneStatusJson(plane));
+  if (verb == "access") return Answer(pending, AccessOf(plane, *caller));
+  if (verb == "preview") return Plan(plane, *request, pending);
+  if (verb == "status") {
+    options_.read([&](const PlaneTable& table) {
+      PlaneInstant shown = plane;
+      shown.table = &table;
+      Answer(pending, PlaneStatusJson(shown));
+    });
+    return;
+  }
   if (PlaneAlarms::IsAbout(verb)) {
-    auto answer = plane.alarms->Answer(*request, NameOf(line.caller), plane.at);
-    if (verb != "alarms") options_.log(verb + " commanded by " + Describe(line.caller));
+    auto answer = plane.alarms->Answer(*request, NameOf(*caller), plane.at);
+    if (verb != "alarms") options_.log(verb + " commanded by " + Describe(*caller));
     return Answer(pending, answer);
   }
   if (verb == "state") {
@@ -167,7 +216,7 @@ void PlaneRequests::Handle(const PlaneInstant& plane, const IncomingLine& line,
     options_.log(verb + " refused: " + command->error().text);
     return refuse(command->error());
   }
-  options_.log(verb + " commanded by " + Describe(line.caller));
+  options_.log(verb + " commanded by " + Describe(*caller));
   pending.kind = verb == "stop"       ? Pending::Kind::kStop
                  : verb == "retarget" ? Pending::Kind::kRetarget
                                       : Pending::Kind::kConfiguration;
@@ -175,6 +224,43 @@ void PlaneRequests::Handle(const PlaneInstant& plane, const IncomingLine& line,
   (*command)->request = next_;
   commands->push_back(std::move(**command));
   pending_.emplace(next_++, pending);
+}
+
+void PlaneRequests::Plan(const PlaneInstant& plane, const ControlRequest& request,
+                         const Pending& pending) {
+  if (dry_run_)
+    return Answer(pending, Fail(ErrorCode::kFull,
+                                "another dry run is being planned; ask again when it is done"));
+  std::optional<Result<PlanePreview>> preview;
+  options_.read([&](const PlaneTable& table) {
+    PlaneInstant with_table = plane;
+    with_table.table = &table;
+    preview = PlanePreviewOf(with_table, request.args);
+  });
+  if (!*preview) return Answer(pending, tl::unexpected<Error>(preview->error()));
+  preview_ = std::move(**preview);
+  preview_->preview.job.job = next_++;  // names the plan for those who want to see its motion
+  dry_run_ = {.pending = pending,
+              .targeted = preview_->preview.targeted,
+              .refused = std::move(preview_->preview.refused),
+              .since = plane.now};
+}
+
+void PlaneRequests::PreviewDone(const PlaneInstant& plane, const PlanDone& done) {
+  if (!dry_run_) return;
+  const DryRun run = *std::exchange(dry_run_, std::nullopt);
+  if (done.plan)
+    return Answer(run.pending, PreviewJson(plane.plane->layout(), done, run.targeted, run.refused));
+  Answer(run.pending, tl::unexpected<Error>(done.plan.error()));
+}
+
+void PlaneRequests::ShowPlanning(const PlaneInstant& plane) {
+  if (!dry_run_) return;
+  const Json planning{{"state", Name(ConfigurationState::kPlanning)},
+                      {"dry_run", true},
+                      {"targeted", dry_run_->targeted},
+                      {"elapsed_s", (plane.now - dry_run_->since).seconds()}};
+  server_->Progress(dry_run_->pending.client, EncodeProgress(dry_run_->pending.id, planning));
 }
 
 void PlaneRequests::Answer(const Pending& pending, const Result<Json>& result) {
@@ -201,8 +287,9 @@ void PlaneRequests::Reply(const PlaneInstant& plane, const ReplyEffect& reply) {
 }
 
 void PlaneRequests::ShowProgress(const PlaneInstant& plane) {
-  if (pending_.empty() || plane.now < progress_at_) return;
+  if ((pending_.empty() && !dry_run_) || plane.now < progress_at_) return;
   progress_at_ = plane.now + options_.progress_period;
+  ShowPlanning(plane);
   const Json progress = ProgressJson(plane);
   std::erase_if(pending_, [&](const auto& entry) {
     const Pending& pending = entry.second;
@@ -216,6 +303,7 @@ void PlaneRequests::ShowProgress(const PlaneInstant& plane) {
 }
 
 void PlaneRequests::Close() {
+  if (dry_run_) pending_.emplace(next_++, std::exchange(dry_run_, std::nullopt)->pending);
   for (const auto& [number, pending] : pending_)
     Answer(pending,
            Fail(ErrorCode::kUnavailable, "this coordinator ends; the sectors hold what they have"));

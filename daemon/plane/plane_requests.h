@@ -6,14 +6,17 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "daemon/control/line_exchange.h"
 #include "daemon/control/messages.h"
 #include "daemon/plane/plane_alarms.h"
 #include "daemon/plane/plane_link.h"
+#include "daemon/plane/plane_preview.h"
 #include "daemon/plane/plane_table.h"
 #include "fleet/plane/plane_coordinator.h"
 
@@ -28,6 +31,8 @@ struct PlaneInstant {
   PlaneLinkCounters link;
   PlaneAlarms* alarms = nullptr;
   bool has_camera = false;
+  std::string page = {};              // address of the operators' page; empty: there is none
+  PlanOptions options = {};           // for previews
   const PlaneTable* table = nullptr;  // null: it is not looked at now
   SteadyTime steady = {};             // `now` of the table
 };
@@ -40,6 +45,7 @@ class PlaneRequests {
  public:
   struct Options {
     DurationNs progress_period = Milliseconds(200);
+    std::uint32_t own_pid = 0;  // clients of this process may ask on behalf of others
     std::function<void(const std::string&)> log;  // one sentence for each command
     /// Calls its argument with the table, which does not change meanwhile.
     std::function<void(const std::function<void(const PlaneTable&)>&)> read;
@@ -53,7 +59,15 @@ class PlaneRequests {
   void Reply(const PlaneInstant& plane, const ReplyEffect& reply);
   /// Clients that wait receive progress, or the end that they wait for.
   void ShowProgress(const PlaneInstant& plane);
-  [[nodiscard]] HostInstant wake_at() const { return pending_.empty() ? kNever : progress_at_; }
+  [[nodiscard]] HostInstant wake_at() const {
+    return pending_.empty() && !dry_run_ ? kNever : progress_at_;
+  }
+  /// The preview that is due to be planned; none: there is none.
+  [[nodiscard]] std::optional<PlanePreview> TakePreview() {
+    return std::exchange(preview_, std::nullopt);
+  }
+  /// The preview was planned, or could not be.
+  void PreviewDone(const PlaneInstant& plane, const PlanDone& done);
   void Close();
 
  private:
@@ -66,10 +80,21 @@ class PlaneRequests {
   void Handle(const PlaneInstant& plane, const IncomingLine& line,
               std::vector<PlaneCommand>* commands);
   void Answer(const Pending& pending, const Result<Json>& result);
+  void Plan(const PlaneInstant& plane, const ControlRequest& request, const Pending& pending);
+  void ShowPlanning(const PlaneInstant& plane);
 
   std::unique_ptr<LineExchange> server_;
   Options options_;
   std::unordered_map<std::uint64_t, Pending> pending_;  // by the number of the command
+  /// The preview under way.
+  struct DryRun {
+    Pending pending;
+    std::uint32_t targeted = 0;
+    std::vector<Preview::Refused> refused;
+    HostInstant since;
+  };
+  std::optional<DryRun> dry_run_;
+  std::optional<PlanePreview> preview_;
   std::uint64_t next_ = 1;
   HostInstant progress_at_{0};
 };

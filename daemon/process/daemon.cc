@@ -340,10 +340,13 @@ Status Daemon::StartThreads() {
   if (status_.page != nullptr) status_.plans.KeepIn(config_.store.path + ".plans");
   doors_.diagnosis = std::make_unique<DiagnosisJob>(DiagnosisJob::Options{
       .programs = StudyPrograms(), .folder = config_.store.path + ".diagnosis"});
-  FOCALFLEET_TRY_ASSIGN(doors_.http,
-                        OpenHttp(config_.http, config_.control.socket,
-                                 {layout_.get(), status_.page.get(), &status_.plans, &status_.night,
-                                  doors_.diagnosis.get(), config_.store.path}));
+  FOCALFLEET_TRY_ASSIGN(doors_.http, OpenHttp(config_.http, config_.control.socket,
+                                              {.layout = layout_.get(),
+                                               .feed = status_.page.get(),
+                                               .plans = &status_.plans,
+                                               .night = &status_.night,
+                                               .diagnosis = doors_.diagnosis.get(),
+                                               .store = config_.store.path}));
   return {};
 }
 

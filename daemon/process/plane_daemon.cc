@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <iterator>
@@ -18,19 +19,24 @@
 
 #include "daemon/camera/camera_work.h"
 #include "daemon/clock/clock.h"
+#include "daemon/clock/process_time.h"
 #include "daemon/control/id_ranges.h"
 #include "daemon/loop/event_loop.h"
 #include "daemon/loop/job_thread.h"
 #include "daemon/plane/plane_link.h"
 #include "daemon/plane/plane_output.h"
+#include "daemon/plane/plane_page.h"
 #include "daemon/plane/plane_record_file.h"
 #include "daemon/plane/plane_requests.h"
 #include "daemon/process/camera_setup.h"
 #include "daemon/process/control_door.h"
 #include "daemon/process/dds_setup.h"
 #include "daemon/process/fleet_setup.h"
+#include "daemon/process/http_door.h"
 #include "daemon/process/sector_setup.h"
 #include "daemon/systemd/notify_socket.h"
+#include "fleet/coordinate/stall_detection.h"
+#include "fleet/plan/job.h"
 
 namespace focalfleet {
 namespace {
@@ -44,6 +50,12 @@ struct KeptRecord {
   Status status;
 };
 using Planner = JobThread<PlaneJob, PlanePlanDone>;
+struct PreviewWork {
+  PlanJob job;
+  std::vector<UnitDrive> drives;
+  std::shared_ptr<std::atomic<bool>> given_up;
+};
+using Previewer = JobThread<PreviewWork, PlanDone>;
 using Camera = JobThread<CameraWork, ExposureDone>;
 using Keeper = JobThread<KeepJob, KeptRecord>;
 
@@ -80,6 +92,9 @@ class PlaneDaemon {
   void TakeKept();
   Status OpenCamera();
   void Expose(PlaneExposure exposure);
+  Status OpenPage();
+  [[nodiscard]] PlanDone Preview(const PreviewWork& work, const std::atomic<bool>& ending);
+  void PreviewIfAsked();
   [[nodiscard]] PlaneInstant Instant() {
     return {.plane = plane_.get(),
             .coordinator = coordinator_.get(),
@@ -88,6 +103,8 @@ class PlaneDaemon {
             .link = link_->counters(),
             .alarms = &alarms_,
             .has_camera = camera_.thread != nullptr,
+            .page = PageAddress(config_.http),
+            .options = preview_options_,
             .steady = std::chrono::steady_clock::now()};
   }
 
@@ -98,6 +115,7 @@ class PlaneDaemon {
   std::unique_ptr<EventSignal> signal_;
   std::unique_ptr<PlaneCoordinator> coordinator_;
   PlaneAlarms alarms_;
+  std::unique_ptr<PlanePage> page_;  // none: there is no HTTP door. The output's reader uses it
   std::unique_ptr<PlaneOutput> output_;
   std::unique_ptr<PlaneRequests> requests_;
   std::unique_ptr<PlaneLink> link_;
@@ -109,6 +127,12 @@ class PlaneDaemon {
     std::unique_ptr<Camera> thread;        // none: there is no camera
   } camera_;
   std::vector<ExposureDone> not_exposed_;
+  struct {
+    std::unique_ptr<Previewer> thread;
+    std::shared_ptr<std::atomic<bool>> given_up;  // of the preview under way; null: none was
+  } previews_;
+  PlanOptions preview_options_;
+  std::unique_ptr<HttpServer> http_;  // the same. Ends before the page
   struct Keeping {
     KeepJob job;
     std::uint64_t kept = 0;  // the number of the last record that is durable
@@ -133,6 +157,7 @@ Status PlaneDaemon::Start() {
   requests_ = std::make_unique<PlaneRequests>(
       std::make_unique<LineServer>(std::move(server)),
       PlaneRequests::Options{.progress_period = clock_.Real(Milliseconds(200)),
+                             .own_pid = static_cast<std::uint32_t>(::getpid()),
                              .log = [](const std::string& text) { spdlog::info("{}", text); },
                              .read = [this](const auto& look) { output_->Read(look); }});
   FOCALFLEET_TRY_ASSIGN(EventSignal signal, EventSignal::Create());
@@ -145,7 +170,12 @@ Status PlaneDaemon::Start() {
   FOCALFLEET_TRY_ASSIGN(
       planner_, Planner::Create(
                     [plane = plane_.get()](const PlaneJob& job, const std::atomic<bool>& ending) {
-                      return RunPlaneJob(job, *plane, [&ending] { return ending.load(); });
+                      const double before_s = ThreadCpuSeconds();
+                      PlanePlanDone done =
+                          RunPlaneJob(job, *plane, [&ending] { return ending.load(); });
+                      spdlog::info("a plan of {} units took {:.2f} s of CPU time", job.units.size(),
+                                   ThreadCpuSeconds() - before_s);
+                      return done;
                     },
                     signal_.get(), {.name = "planner"}));
   sigset_t set;
@@ -167,11 +197,13 @@ Status PlaneDaemon::Start() {
                                troubles_->Report(AlarmName::kDdsMissing, "the plane", trouble);
                              }});
   FOCALFLEET_TRY(OpenCamera());
+  FOCALFLEET_TRY(OpenPage());
   output_ = std::make_unique<PlaneOutput>(
       PlaneOutput::Options{.plane = plane_.get(),
                            .dds = DdsOptionsOf(config_.dds),
                            .started = WallTime::Now(),
                            .metrics = MetricsServerOf(config_.metrics),
+                           .page = page_.get(),
                            .tell = [this](const char* part, const std::string& trouble) {
                              troubles_->Report(AlarmName::kDdsMissing, part, trouble);
                            }});
@@ -208,6 +240,43 @@ Status PlaneDaemon::OpenCamera() {
   return {};
 }
 
+Status PlaneDaemon::OpenPage() {
+  const PlaneTimes times = PlaneTimesAt(config_.clock.speed);
+  preview_options_.lead_apart = true;
+  preview_options_.start_skew_s += times.clock_allowance.seconds();
+  preview_options_.notice_s =
+      StallDetectionOf(config_.timing).notice.seconds() + times.border_notice.seconds();
+  if (config_.http.port != 0)
+    page_ = std::make_unique<PlanePage>(plane_.get(), config_.http.viewers_max);
+  FOCALFLEET_TRY_ASSIGN(
+      previews_.thread,
+      Previewer::Create([this](const PreviewWork& work,
+                               const std::atomic<bool>& ending) { return Preview(work, ending); },
+                        signal_.get(), {.name = "preview"}));
+  if (page_ == nullptr) return {};
+  FOCALFLEET_TRY_ASSIGN(http_, OpenHttp(config_.http, config_.control.socket, page_->parts()));
+  return {};
+}
+
+PlanDone PlaneDaemon::Preview(const PreviewWork& work, const std::atomic<bool>& ending) {
+  PlanDone done = RunPlanJob(work.job, plane_->layout(), work.drives,
+                             [&] { return ending.load() || work.given_up->load(); });
+  if (page_ != nullptr && done.plan) page_->KeepPreview(work.job, *done.plan, work.drives);
+  return done;
+}
+
+/// A configuration does not wait for a preview: that is given up.
+void PlaneDaemon::PreviewIfAsked() {
+  while (const auto done = previews_.thread->Take()) requests_->PreviewDone(Instant(), *done);
+  std::optional<PlanePreview> asked = requests_->TakePreview();
+  if (!asked) return;
+  previews_.given_up = std::make_shared<std::atomic<bool>>(false);
+  PreviewWork work{std::move(asked->preview.job), std::move(asked->drives), previews_.given_up};
+  if (previews_.thread->Submit(&work)) return;
+  requests_->PreviewDone(
+      Instant(), PlanFailed(work.job, {ErrorCode::kFull, "the planner has no room; ask again"}));
+}
+
 void PlaneDaemon::Expose(PlaneExposure exposure) {
   const std::uint64_t id = exposure.job.id;
   CameraWork work{std::move(exposure.job), std::move(exposure.drives)};
@@ -228,6 +297,8 @@ void PlaneDaemon::Run() {
   }
   static_cast<void>(service_.Send("STOPPING=1"));
   requests_->Close();
+  http_.reset();
+  previews_.thread.reset();
   credentials_.reset();
   camera_.thread.reset();
   output_.reset();
@@ -261,6 +332,7 @@ void PlaneDaemon::Turn() {
   const PlaneMail mail = link_->Take();
   std::vector<PlaneCommand> commands;
   requests_->Service(Instant(), &commands);
+  PreviewIfAsked();
   PlaneEffects effects;
   coordinator_->Step({.now = now_,
                       .reports = mail.reports,
@@ -292,6 +364,7 @@ void PlaneDaemon::Perform(PlaneEffects* effects) {
     if (!keeper_->Submit(&job)) keeping_.again_at = now_;
   }
   if (effects->job) {
+    if (previews_.given_up != nullptr) *previews_.given_up = true;
     PlaneJob job = std::move(*effects->job);
     if (!planner_->Submit(&job)) spdlog::error("the planner's thread has no room");
   }

@@ -6,10 +6,10 @@
 
 namespace focalfleet {
 
-Json PreviewJson(const FleetView& view, const PlanDone& done, std::uint32_t targeted,
+Json PreviewJson(const Layout& layout, const PlanDone& done, std::uint32_t targeted,
                  std::span<const Preview::Refused> refused) {
   const Plan& plan = *done.plan;
-  const auto id = [&](PositionerIndex i) { return view.layout->unit(i).id.value; };
+  const auto id = [&](PositionerIndex i) { return layout.unit(i).id.value; };
   std::map<std::uint32_t, std::string> reasons;
   for (const auto& [unit, reason] : refused) reasons[id(unit)] = reason;
   for (const Unserved& unserved : plan.unserved)

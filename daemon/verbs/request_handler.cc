@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/access/rights.h"
+#include "daemon/control/asker.h"
 #include "daemon/status/history_json.h"
 #include "daemon/status/status_json.h"
 #include "daemon/verbs/alarm_requests.h"
@@ -110,14 +111,12 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
                   Fail(ErrorCode::kFull, "too many clients, only stop is taken: all " +
                                              std::to_string(limits::kControlClients) +
                                              " places have requests open, try again later"));
-  const bool for_other =
-      request->caller && line.caller.peer && line.caller.peer->pid == options_.own_pid;
-  if (request->caller && !for_other) {
-    const Error why{ErrorCode::kRefused, "only the daemon itself asks on behalf of others"};
-    NoteRefusal(view, line, {*request, line.caller}, why);
-    return Answer(pending, tl::unexpected<Error>(why));
+  const Result<Caller> asker = AskerOf(*request, line, options_.own_pid);
+  if (!asker) {
+    NoteRefusal(view, line, {*request, line.caller}, asker.error());
+    return Answer(pending, tl::unexpected<Error>(asker.error()));
   }
-  Do(view, line, {*request, for_other ? *request->caller : line.caller}, commands);
+  Do(view, line, {*request, *asker}, commands);
 }
 
 void RequestHandler::NoteRefusal(const FleetView& view, const IncomingLine& line,
@@ -364,7 +363,8 @@ Status RequestHandler::Plan(const FleetView& view, const ControlRequest& request
 void RequestHandler::PreviewDone(const FleetView& view, const PlanDone& done) {
   if (!dry_run_) return;
   const DryRun run = *std::exchange(dry_run_, std::nullopt);
-  if (done.plan) return Answer(run.pending, PreviewJson(view, done, run.targeted, run.refused));
+  if (done.plan)
+    return Answer(run.pending, PreviewJson(*view.layout, done, run.targeted, run.refused));
   Answer(run.pending, tl::unexpected<Error>(done.plan.error()));
 }
 

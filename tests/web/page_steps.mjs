@@ -6,6 +6,7 @@ import {armStop, assert, axeFindings, coloursOf, dropFile, given, isLive, kMovin
 import {calm} from "./calm_steps.mjs";
 import {heap} from "./heap_steps.mjs";
 import {past, study, tabs} from "./past_steps.mjs";
+import {plane} from "./plane_steps.mjs";
 import {tasks} from "./task_steps.mjs";
 
 const targets = () => readFileSync(given.targets, "utf8");
@@ -298,7 +299,7 @@ async function closer(tab, colorScheme) {
   await tab.screenshot({path: `${given.out}/preview-${colorScheme}.png`});
 }
 
-const scenarios = {night, looks, past, study, tabs, tasks, calm, heap};
+const scenarios = {night, looks, past, study, tabs, tasks, calm, heap, plane};
 await withBrowser((browser) => scenarios[given.scenario](browser));
 say("done");
 process.exit(0);

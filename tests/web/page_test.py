@@ -2,8 +2,8 @@
 
   page_test.py PROGRAMS NODE_FOLDER OUT_FOLDER SCENARIO
 
-SCENARIO: night, looks, past, study, tabs, tasks, calm or heap. The steps are in page_steps.mjs, past_steps.mjs, task_steps.mjs, calm_steps.mjs and
-heap_steps.mjs; they ask here for what the world around the page does: the daemon ends, comes back, a bus dies.
+SCENARIO: night, looks, past, study, tabs, tasks, calm, heap or plane. The steps are in page_steps.mjs, past_steps.mjs, task_steps.mjs, calm_steps.mjs,
+heap_steps.mjs and plane_steps.mjs; they ask here for what the world around the page does: the daemon ends, comes back, a bus dies.
 """
 
 import csv
@@ -13,11 +13,12 @@ import sqlite3
 import subprocess
 import sys
 
+from plane_fleet import WebPlane
 from web_fleet import WebFleet
 
 DAY_NS = 86_400_000_000_000
 HERE = pathlib.Path(__file__).resolve().parent
-COUNTS = {"night": 120, "looks": 5000, "past": 120, "study": 19, "tabs": 37, "tasks": 120, "calm": 120, "heap": 1000}
+COUNTS = {"night": 120, "looks": 5000, "past": 120, "study": 19, "tabs": 37, "tasks": 120, "calm": 120, "heap": 1000, "plane": 60}
 PLACES = {"tabs": 3}  # for viewers
 
 
@@ -28,6 +29,8 @@ def world(fleet, line):
         fleet.stop_daemon()
     elif word == "start-daemon":
         fleet.start_daemon("heard")  # a unit has a fault
+    elif word == "stop-sector":
+        fleet.stop_sector(int(arguments[0]))
     elif word == "disable":
         fleet.cli("disable", arguments[0], "--reason", "its gear is worn")
     elif word == "yesterday":  # what the store has so far was a day before
@@ -104,7 +107,8 @@ def main():
     out = pathlib.Path(out)
     out.mkdir(parents=True, exist_ok=True)
     http = f"viewers_max = {PLACES.get(scenario, 16)}\n"
-    with WebFleet(programs, COUNTS[scenario], speed=4, http=http, camera=scenario == "study") as fleet:
+    Fleet = WebPlane if scenario == "plane" else WebFleet
+    with Fleet(programs, COUNTS[scenario], speed=4, http=http, camera=scenario in ("study", "plane")) as fleet:
         return run(fleet, pathlib.Path(node_folder).resolve(), out.resolve(), scenario)
 
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "deploy" / "python"))
-from simulated_fleet import SimulatedFleet  # noqa: E402
+from simulated_fleet import WAIT_S, SimulatedFleet  # noqa: E402,F401
 
 
 def free_port():

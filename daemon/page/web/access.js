@@ -64,6 +64,11 @@ export class Access {
     return Boolean(this.verbs.get(verb)?.allowed);
   }
 
+  /** The daemon carries the verb out for some role: a coordinator of a plane has fewer of them. */
+  has(verb) {
+    return this.verbs.has(verb);
+  }
+
   /** A button of a verb: disabled, with the reason, where the role does not suffice. */
   guard(button, verb) {
     const least = this.verbs.get(verb)?.least ?? "operator";

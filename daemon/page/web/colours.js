@@ -108,6 +108,7 @@ export function makeThemes(fleet, neighbours, now_ms) {
       ...scale(kAgeLimits_s, "s ago", (u) => (now_ms() - fleet.changed_ms[u]) / 1000,
           "not since this page began")},
     power: {...kMotors, indexOf: (u) => fleet.motorsOf(u), followsFrames: true},
+    ...(fleet.sector ? {sector: {title: "Sector", ...groups(neighbours, fleet.sector, "sector")}} : {}),
     bus: {title: "Bus", ...groups(neighbours, fleet.bus, "bus")},
     rail: {title: "Power rail", ...groups(neighbours, fleet.rail, "rail")},
   };
@@ -122,6 +123,7 @@ export function makeFilmThemes(film, themes) {
       return Number.isNaN(value) ? kErrorLimits_um.length + 1 : classOf(value, kErrorLimits_um);
     }},
     power: {...kMotors, indexOf: (u) => film.motorsOf(u)},
+    ...(themes.sector ? {sector: themes.sector} : {}),
     bus: themes.bus,
     rail: themes.rail,
   };

@@ -142,7 +142,8 @@ export class Configuration {
     this.say(make("h3", {}, `Preview of ${this.file.source}`),
         make("p", {class: "buttons"}, apply, play,
             make("button", {type: "button", onclick: () => this.clear()}, "Discard")),
-        make("p", {class: "buttons"}, make("span", {class: "hint"}, "Corrections"), corrections),
+        ...(this.access.has("measure") ? [make("p", {class: "buttons"},
+            make("span", {class: "hint"}, "Corrections"), corrections)] : []),
         make("p", {class: "trouble", id: "apply-trouble", role: "alert"}), make("dl", {},
             make("dt", {}, "served"), make("dd", {}, `${preview.served.toLocaleString("en")} of ` +
                 counted(preview.targeted, "target")),

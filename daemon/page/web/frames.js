@@ -63,6 +63,7 @@ export class Fleet {
     };
     for (const name of ["id", "x_mm", "y_mm", "arm_theta_mm", "arm_phi_mm", "half_width_mm",
       "patrol_min_mm", "patrol_max_mm", "bus", "node", "rail"]) this[name] = column(name);
+    this.sector = layout.units.sector === undefined ? null : column("sector");  // of a plane alone
     this.placeOf = new Map();
     for (let u = 0; u < n; ++u) this.placeOf.set(this.id[u], u);
     // As the newest frame has them. Angles in radians; NaN: not known.

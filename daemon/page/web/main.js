@@ -37,6 +37,11 @@ function inWords(age_ms) {
   return age_ms < kFresh_ms ? "less than 2 s" : duration(Math.floor(age_ms / 1000)).replace(".0", "");
 }
 
+/** Parts of the page, and the verb without which each of them is nothing. */
+const kOffers = [["show-nights", "history"], ["show-model", "model"], ["show-diagnosis", "diagnose"],
+  ["show-camera", "measurements"], ["earlier-section", "replay"], ["events-section", "events"],
+  ["commands-section", "audit"]];
+
 class Page {
   constructor() {
     this.api = new Api();
@@ -63,6 +68,7 @@ class Page {
 
   async signedIn() {
     if (this.plate) {
+      this.offer();
       this.stream.restart();
       this.alarms.refresh();
       this.commands.note();
@@ -89,7 +95,7 @@ class Page {
     this.plate.ways = new Ways(this.api, this.plate);
     const showUnit = (id) => this.unit.showId(id);
     this.player = new Player(this.plate, () => this.filmChanged(), () => this.showLegend());
-    this.unit = new UnitPanel(this.api, this.plate, this.player, () => this.showScale(),
+    this.unit = new UnitPanel(this.api, this.access, this.plate, this.player, () => this.showScale(),
         (u) => this.player.select(u));
     this.alarms = new Alarms(this.api, this.access, showUnit);
     this.configuration = new Configuration(this.api, this.access, this.plate, this.player,
@@ -99,6 +105,7 @@ class Page {
     this.events = new Events(this.api, () => this.commands.note());
     this.openThemes();
     this.openSheets();
+    this.offer();
     new Pointer(this.plate, (u) => this.unit.select(u), () => this.showScale());
     const fit = () => {
       this.plate.resize();
@@ -154,6 +161,15 @@ class Page {
     const select = find("theme");
     select.value = "error";
     select.dispatchEvent(new Event("change"));
+  }
+
+  /** What the daemon does not carry out is not offered. */
+  offer() {
+    for (const [id, verb] of kOffers) {
+      const element = find(id);
+      element.hidden = !this.access.has(verb);
+    }
+    if (find(`show-${this.sheets.shown}`).hidden) this.sheets.show("plate");
   }
 
   openThemes() {
@@ -246,11 +262,13 @@ class Page {
     this.showSummary();
     this.configuration.note(facts);
     this.plate.ways.note(facts);
-    this.earlier.note(facts);
-    this.nights.note(facts);
+    if (this.access.has("history")) {
+      this.earlier.note(facts);
+      this.nights.note(facts);
+    }
     this.alarms.note(facts.alarms);
-    this.events.note(facts);
-    this.unit.history.note(facts);
+    if (this.access.has("events")) this.events.note(facts);
+    if (this.access.has("history")) this.unit.history.note(facts);
     const down = facts.buses.filter(({link}) => link !== "up");
     const load = Math.max(0, ...facts.buses.map((bus) => bus.load));
     set(find("buses"), "className", down.length > 0 ? "trouble" : "");

@@ -23,8 +23,8 @@ export class UnitPanel {
    * `onView()`: the view moves; `onSelect(place)`: another unit, or -1. `player` shows a film at times,
    * which is not what the panel says of the unit.
    */
-  constructor(api, plate, player, onView, onSelect) {
-    Object.assign(this, {api, plate, player, onView, onSelect});
+  constructor(api, access, plate, player, onView, onSelect) {
+    Object.assign(this, {api, access, plate, player, onView, onSelect});
     this.place = -1;
     this.film = make("div", {id: "unit-film"});
     this.list = make("dl");
@@ -77,14 +77,14 @@ export class UnitPanel {
     this.plate.dirty = true;
     find("unit-hint").hidden = place >= 0;
     find("unit").replaceChildren(...(place >= 0
-      ? [this.film, this.list, this.beside, ...this.history.elements] : []));
+      ? [this.film, this.list, this.beside, ...(this.access.has("history") ? this.history.elements : [])] : []));
     if (place < 0) return;
     find("find-id").value = String(this.plate.fleet.id[place]);
     this.list.replaceChildren();
     this.showFilm();
     this.showBeside();
     this.refresh();
-    this.history.show(this.plate.fleet.id[place]);
+    if (this.access.has("history")) this.history.show(this.plate.fleet.id[place]);
   }
 
   /** What the unit does in the film, where the plate shows one; what stands below is live. */
@@ -107,6 +107,7 @@ export class UnitPanel {
     const asked = ++this.asked;
     const {fleet} = this.plate;
     const u = this.place;
+    if (!this.access.has("unit")) return this.showFromPlate(u);
     try {
       const unit = await this.api.ask("unit", {unit_id: fleet.id[u]});
       if (asked === this.asked) this.show(unit);
@@ -115,6 +116,20 @@ export class UnitPanel {
       this.rows([["state", kPhases[fleet.phase[u]]], ["target", kOutcomes[fleet.outcome[u]]],
         ["more", `not known: ${error.message}`]]);
     }
+  }
+
+  /** What the plate has of a unit, where its own daemon alone has more. */
+  showFromPlate(u) {
+    const {fleet} = this.plate;
+    const angle = (radians) => Number.isNaN(radians) ? "not known"
+      : `${(radians * 180 / Math.PI).toFixed(2)}° on the plate`;
+    this.rows([["state", kPhases[fleet.phase[u]] + (fleet.enabled[u] ? "" : ", disabled")],
+      ["target", kOutcomes[fleet.outcome[u]]],
+      ["place", kWitnesses[fleet.witness[u]]],
+      ["theta", angle(fleet.theta[u])],
+      ["off by", Number.isNaN(fleet.error_um[u]) ? "" : micrometres(fleet.error_um[u])],
+      ["sector", fleet.sector ? `${fleet.sector[u]}, whose daemon has the history` : ""],
+      ["bus", `${fleet.bus[u]}, node ${fleet.node[u]}, rail ${fleet.rail[u]}`]]);
   }
 
   rows(pairs) {

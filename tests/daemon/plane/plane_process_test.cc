@@ -251,6 +251,16 @@ TEST_F(PlaneProcesses, HomeAndGiveOtherTargets) {
   ASSERT_TRUE(homed.has_value()) << homed.error().text << Logs();
   EXPECT_EQ((*homed)["kind"], "home");
   EXPECT_EQ((*homed)["arrived"], 1) << *homed << Logs();
+  // Nobody but the daemon's own doors may name another caller.
+  auto client = LineClient::Connect(scratch_ / "plane.sock");
+  ASSERT_TRUE(client.has_value());
+  const auto forged =
+      client->Call("access", Json::object(),
+                   {.silence_max = Seconds(120),
+                    .on_progress = {},
+                    .caller = Caller{.role = Role::kEngineer, .door = Door::kHttp, .token = "t"}});
+  ASSERT_FALSE(forged.has_value());
+  EXPECT_EQ(forged.error().text, "only the daemon itself asks on behalf of others");
   const auto none = Ask("plane", "retarget", {{"unit_id", id}, {"theta_deg", 10}, {"phi_deg", 90}});
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error().text, "no configuration is under way: apply one");

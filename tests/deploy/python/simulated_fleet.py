@@ -31,6 +31,8 @@ class SimulatedFleet:
     `secured`: DDS Security, with credentials for each role in `keys()`.
     """
 
+    layout_options = ()  # of `focalfleet layout hex`
+
     def __init__(self, programs, count, *, speed=10, camera=False, dds=False, awaited="ready", secured=False):
         self.programs = pathlib.Path(programs).resolve()
         self.count = count
@@ -83,7 +85,7 @@ class SimulatedFleet:
     def _prepare(self):
         (self.folder / "bus").mkdir()
         fiducials = ["--fiducials", 40, "--fiducials-out", "fiducials.csv"] if self.camera else []
-        self.cli("layout", "hex", "--count", self.count, "--out", "units.csv", "--quiet", *fiducials)
+        self.cli("layout", "hex", "--count", self.count, "--out", "units.csv", "--quiet", *self.layout_options, *fiducials)
         start = ["targets", "--units", "units.csv", "--quiet"]
         self.cli(*start, "--seed", 1, "--as", "state", "--out", "state.csv")
         self.cli(*start, "--seed", 2, "--from", "state.csv", "--as", "targets", "--out", "targets.csv")
