@@ -24,7 +24,7 @@ class PlanePage {
   /// `plane` outlives the page.
   PlanePage(const PlaneLayout* plane, std::size_t viewers_max);
 
-  /// What sectors have published.
+  /// Takes what sectors have published.
   void Take(const StatusUpdate& update);
   /// The plane as it is published once a second. Pre: `plane` has a table.
   void Take(const PlaneInstant& plane, const FleetStatusValue& fleet,

@@ -8,7 +8,7 @@
 
 namespace focalfleet {
 
-/// What an `apply` of the same file would begin with, as a job for the planner. All lists are by
+/// The job for the planner with which an `apply` of the same file would begin. All lists are by
 /// the plane's positions.
 struct PlanePreview {
   Preview preview;

@@ -12,6 +12,8 @@ Result<std::string> CheckDaemon(const DaemonConfig& config) {
   if (config.plane.coordinates()) {
     FOCALFLEET_TRY_ASSIGN(const PlaneLayout plane, LoadPlane(config));
     FOCALFLEET_TRY(FindRoles(config.control));
+    FOCALFLEET_TRY(CheckHttpDoor(config.http));
+    if (config.camera.present()) FOCALFLEET_TRY(LoadCameraSite(config.camera));
     return "# " + std::to_string(plane.layout().size()) + " units in " +
            std::to_string(plane.sectors()) + " sectors\n" + EffectiveConfig(config);
   }

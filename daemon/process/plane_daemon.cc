@@ -104,7 +104,7 @@ class PlaneDaemon {
             .alarms = &alarms_,
             .has_camera = camera_.thread != nullptr,
             .page = PageAddress(config_.http),
-            .options = preview_options_,
+            .options = pages_.options,
             .steady = std::chrono::steady_clock::now()};
   }
 
@@ -115,7 +115,13 @@ class PlaneDaemon {
   std::unique_ptr<EventSignal> signal_;
   std::unique_ptr<PlaneCoordinator> coordinator_;
   PlaneAlarms alarms_;
-  std::unique_ptr<PlanePage> page_;  // none: there is no HTTP door. The output's reader uses it
+  struct {
+    PlanOptions options;                          // of previews
+    std::shared_ptr<std::atomic<bool>> given_up;  // of the preview under way; null: none was
+    std::unique_ptr<PlanePage> page;              // none: there is no HTTP door
+    std::unique_ptr<Previewer> previewer;
+    std::unique_ptr<HttpServer> http;  // none: the same. Ends before the page
+  } pages_;                            // the output's reader uses the page
   std::unique_ptr<PlaneOutput> output_;
   std::unique_ptr<PlaneRequests> requests_;
   std::unique_ptr<PlaneLink> link_;
@@ -125,14 +131,8 @@ class PlaneDaemon {
     std::unique_ptr<CameraWorker> worker;  // none: there is no camera
     CameraPort* port = nullptr;            // of the worker, which owns it
     std::unique_ptr<Camera> thread;        // none: there is no camera
+    std::vector<ExposureDone> not_done;    // answers without an exposure
   } camera_;
-  std::vector<ExposureDone> not_exposed_;
-  struct {
-    std::unique_ptr<Previewer> thread;
-    std::shared_ptr<std::atomic<bool>> given_up;  // of the preview under way; null: none was
-  } previews_;
-  PlanOptions preview_options_;
-  std::unique_ptr<HttpServer> http_;  // the same. Ends before the page
   struct Keeping {
     KeepJob job;
     std::uint64_t kept = 0;  // the number of the last record that is durable
@@ -203,7 +203,7 @@ Status PlaneDaemon::Start() {
                            .dds = DdsOptionsOf(config_.dds),
                            .started = WallTime::Now(),
                            .metrics = MetricsServerOf(config_.metrics),
-                           .page = page_.get(),
+                           .page = pages_.page.get(),
                            .tell = [this](const char* part, const std::string& trouble) {
                              troubles_->Report(AlarmName::kDdsMissing, part, trouble);
                            }});
@@ -242,37 +242,39 @@ Status PlaneDaemon::OpenCamera() {
 
 Status PlaneDaemon::OpenPage() {
   const PlaneTimes times = PlaneTimesAt(config_.clock.speed);
-  preview_options_.lead_apart = true;
-  preview_options_.start_skew_s += times.clock_allowance.seconds();
-  preview_options_.notice_s =
+  pages_.options.lead_apart = true;
+  pages_.options.start_skew_s += times.clock_allowance.seconds();
+  pages_.options.notice_s =
       StallDetectionOf(config_.timing).notice.seconds() + times.border_notice.seconds();
   if (config_.http.port != 0)
-    page_ = std::make_unique<PlanePage>(plane_.get(), config_.http.viewers_max);
+    pages_.page = std::make_unique<PlanePage>(plane_.get(), config_.http.viewers_max);
   FOCALFLEET_TRY_ASSIGN(
-      previews_.thread,
+      pages_.previewer,
       Previewer::Create([this](const PreviewWork& work,
                                const std::atomic<bool>& ending) { return Preview(work, ending); },
                         signal_.get(), {.name = "preview"}));
-  if (page_ == nullptr) return {};
-  FOCALFLEET_TRY_ASSIGN(http_, OpenHttp(config_.http, config_.control.socket, page_->parts()));
+  if (pages_.page == nullptr) return {};
+  FOCALFLEET_TRY_ASSIGN(pages_.http,
+                        OpenHttp(config_.http, config_.control.socket, pages_.page->parts()));
   return {};
 }
 
 PlanDone PlaneDaemon::Preview(const PreviewWork& work, const std::atomic<bool>& ending) {
   PlanDone done = RunPlanJob(work.job, plane_->layout(), work.drives,
                              [&] { return ending.load() || work.given_up->load(); });
-  if (page_ != nullptr && done.plan) page_->KeepPreview(work.job, *done.plan, work.drives);
+  if (pages_.page != nullptr && done.plan)
+    pages_.page->KeepPreview(work.job, *done.plan, work.drives);
   return done;
 }
 
 /// A configuration does not wait for a preview: that is given up.
 void PlaneDaemon::PreviewIfAsked() {
-  while (const auto done = previews_.thread->Take()) requests_->PreviewDone(Instant(), *done);
+  while (const auto done = pages_.previewer->Take()) requests_->PreviewDone(Instant(), *done);
   std::optional<PlanePreview> asked = requests_->TakePreview();
   if (!asked) return;
-  previews_.given_up = std::make_shared<std::atomic<bool>>(false);
-  PreviewWork work{std::move(asked->preview.job), std::move(asked->drives), previews_.given_up};
-  if (previews_.thread->Submit(&work)) return;
+  pages_.given_up = std::make_shared<std::atomic<bool>>(false);
+  PreviewWork work{std::move(asked->preview.job), std::move(asked->drives), pages_.given_up};
+  if (pages_.previewer->Submit(&work)) return;
   requests_->PreviewDone(
       Instant(), PlanFailed(work.job, {ErrorCode::kFull, "the planner has no room; ask again"}));
 }
@@ -281,7 +283,7 @@ void PlaneDaemon::Expose(PlaneExposure exposure) {
   const std::uint64_t id = exposure.job.id;
   CameraWork work{std::move(exposure.job), std::move(exposure.drives)};
   if (camera_.thread != nullptr && camera_.thread->Submit(&work)) return;
-  not_exposed_.push_back(
+  camera_.not_done.push_back(
       {id, Fail(ErrorCode::kUnavailable, camera_.thread == nullptr
                                              ? "the plane's coordinator has no camera"
                                              : "the camera's thread has no room")});
@@ -297,8 +299,8 @@ void PlaneDaemon::Run() {
   }
   static_cast<void>(service_.Send("STOPPING=1"));
   requests_->Close();
-  http_.reset();
-  previews_.thread.reset();
+  pages_.http.reset();
+  pages_.previewer.reset();
   credentials_.reset();
   camera_.thread.reset();
   output_.reset();
@@ -326,7 +328,7 @@ void PlaneDaemon::Turn() {
   TakeKept();
   std::vector<PlanePlanDone> plans;
   while (auto plan = planner_->Take()) plans.push_back(std::move(*plan));
-  std::vector<ExposureDone> exposures = std::exchange(not_exposed_, {});
+  std::vector<ExposureDone> exposures = std::exchange(camera_.not_done, {});
   while (auto done = camera_.thread != nullptr ? camera_.thread->Take() : std::nullopt)
     exposures.push_back(std::move(*done));
   const PlaneMail mail = link_->Take();
@@ -364,7 +366,7 @@ void PlaneDaemon::Perform(PlaneEffects* effects) {
     if (!keeper_->Submit(&job)) keeping_.again_at = now_;
   }
   if (effects->job) {
-    if (previews_.given_up != nullptr) *previews_.given_up = true;
+    if (pages_.given_up != nullptr) *pages_.given_up = true;
     PlaneJob job = std::move(*effects->job);
     if (!planner_->Submit(&job)) spdlog::error("the planner's thread has no room");
   }

@@ -143,11 +143,8 @@ void ConfigurationProgress::TakeRound(const SectorRound& round) {
   TakePlan(done);
 }
 
-void ConfigurationProgress::AskAnew() {
-  if (configuration_.phase() == Phase::kPlanning) Gather();
-}
-
 void ConfigurationProgress::Withdraw() {
+  if (configuration_.phase() == Phase::kPlanning) return Gather();
   if (configuration_.phase() == Phase::kHomeCommitting) {
     TakeBackIntents(fleet_, &round_);
     return Gather();

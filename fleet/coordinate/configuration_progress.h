@@ -34,10 +34,9 @@ class ConfigurationProgress {
   void OnPlan(const PlanDone& done);
   /// The part of a plane's plan that this sector carries out. Pre: it waits for it.
   void TakeRound(const SectorRound& round);
-  /// A round that has not started is given back, and another plan is asked for.
+  /// A round that has not started is given back, or a plan is no use any more that is waited for:
+  /// another plan is asked for.
   void Withdraw();
-  /// The plan that is waited for is no use any more: another one is asked for.
-  void AskAnew();
   void OnExposure(const ExposureDone& done);
   /// Goes on as far as it can now.
   void Advance();

@@ -61,7 +61,7 @@ Status SectorRounds::Do(const SectorRetargetCommand& command) {
       configuration.outcomes.Set(i, TargetOutcome::kRefused,
                                  "its range, as it was measured, ends before it");
   }
-  progress_.AskAnew();
+  progress_.Withdraw();
   return {};
 }
 

@@ -1,26 +1,93 @@
-// The exposures of a plane's camera: what all sectors believe goes to the camera's thread as one
-// job, and each sector that asks is told what was found of its units.
+#include "fleet/plane/plane_measuring.h"
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include "fleet/kinematics.h"
-#include "fleet/plane/plane_coordinator.h"
 
 namespace focalfleet {
 namespace {
 
-/// Puts what a sector believes into the plane's job. `list` is of the sector, `whole` of the plane.
+/// Puts a list of a sector into one of the plane.
 template <class Value>
 void Spread(const std::vector<Value>& list, std::span<const PositionerIndex> own,
             std::vector<Value>* whole) {
   for (std::size_t n = 0; n < own.size(); ++n) (*whole)[own[n].value] = list[n];
 }
 
-/// The findings about one sector, by its positions.
+}  // namespace
+
+bool Looks(const SectorBook& sectors, std::uint32_t sector, const PlaneConfigurationId& id) {
+  if (!sectors.IsUsable(sector)) return false;
+  const SectorBook::Entry& entry = sectors[sector];
+  if (entry.report->configuration != id || entry.report->stage != SectorStage::kLooking ||
+      entry.exposure == nullptr)
+    return false;
+  const PlaneOrder& order = entry.order;
+  return order.kind != OrderKind::kFindings || order.configuration != id ||
+         order.incarnation != entry.report->incarnation || order.job != entry.exposure->id;
+}
+
+std::shared_ptr<const SectorJob> StandingJob(const SectorBook& sectors, std::uint32_t sector,
+                                             const PlaneConfigurationId& id) {
+  if (!sectors.IsUsable(sector)) return nullptr;
+  const SectorBook::Entry& entry = sectors[sector];
+  const SectorReport& report = *entry.report;
+  auto job = std::make_shared<SectorJob>();
+  if (Looks(sectors, sector, id)) {
+    job->start = entry.exposure->expected;
+    job->drives = entry.exposure->drives;
+  } else if (report.configuration.number == 0 && report.last_over == id &&
+             report.stage == SectorStage::kIdle && entry.places != nullptr &&
+             report.places_now != 0 && report.places_now == entry.places_digest) {
+    job->start = entry.places->places;
+    job->drives = entry.places->drives;
+  } else {
+    return nullptr;
+  }
+  job->targets.resize(entry.units);
+  job->frozen.assign(entry.units, 1);
+  job->offsets.resize(entry.units);
+  return job;
+}
+
+PlaneExposure MakeExposure(std::uint64_t number, HostInstant now, const PlaneLayout& plane,
+                           const SectorBook& sectors, const PlaneConfigurationId& id) {
+  const std::size_t units = plane.layout().size();
+  PlaneExposure exposure{.job = {.id = number,
+                                 .since = now,
+                                 .expected = std::vector<UnitKnowledge>(units),
+                                 .before = std::vector<std::optional<Pose>>(units),
+                                 .reported = std::vector<std::optional<Pose>>(units),
+                                 .seen = std::vector<std::uint8_t>(units),
+                                 .wanted = std::vector<std::uint8_t>(units)},
+                         .drives = std::vector<UnitDrive>(units)};
+  ExposureJob& job = exposure.job;
+  for (std::uint32_t sector = 0; sector < sectors.size(); ++sector) {
+    const auto own = plane.own(sector);
+    if (Looks(sectors, sector, id)) {
+      const SectorExposure& asked = *sectors[sector].exposure;
+      Spread(asked.expected, own, &job.expected);
+      Spread(asked.before, own, &job.before);
+      Spread(asked.reported, own, &job.reported);
+      Spread(asked.seen, own, &job.seen);
+      Spread(asked.wanted, own, &job.wanted);
+      Spread(asked.drives, own, &exposure.drives);
+      job.tolerance_um = std::max(job.tolerance_um, asked.tolerance_um);
+    } else if (const auto standing = StandingJob(sectors, sector, id)) {
+      Spread(standing->start, own, &job.expected);
+      Spread(standing->drives, own, &exposure.drives);
+    }
+  }
+  return exposure;
+}
+
 ExposureFindings PartOf(const ExposureFindings& findings, const PlaneLayout& plane,
-                        std::uint32_t sector, std::uint64_t id) {
-  ExposureFindings part{.id = id,
+                        std::uint32_t sector, std::uint64_t exposure) {
+  ExposureFindings part{.id = exposure,
                         .measurements = {},
                         .after_request_s = findings.after_request_s,
                         .camera = findings.camera,
@@ -38,112 +105,35 @@ ExposureFindings PartOf(const ExposureFindings& findings, const PlaneLayout& pla
   return part;
 }
 
-}  // namespace
-
-/// The sector asks for an exposure, and has not been told of it.
-bool PlaneCoordinator::Looks(std::uint32_t sector) const {
-  const SectorBook::Entry& entry = sectors_[sector];
-  if (entry.report->configuration != Id() || entry.report->stage != SectorStage::kLooking ||
-      entry.exposure == nullptr)
-    return false;
-  const PlaneOrder& order = entry.order;
-  return order.kind != OrderKind::kFindings || order.configuration != Id() ||
-         order.incarnation != entry.report->incarnation || order.job != entry.exposure->id;
-}
-
-void PlaneCoordinator::Look() {
-  const std::size_t units = plane_.layout().size();
-  PlaneExposure exposure{.job = {.id = ++exposure_,
-                                 .since = now_,
-                                 .expected = std::vector<UnitKnowledge>(units),
-                                 .before = std::vector<std::optional<Pose>>(units),
-                                 .reported = std::vector<std::optional<Pose>>(units),
-                                 .seen = std::vector<std::uint8_t>(units),
-                                 .wanted = std::vector<std::uint8_t>(units)},
-                         .drives = std::vector<UnitDrive>(units)};
-  ExposureJob& job = exposure.job;
-  for (std::uint32_t sector = 0; sector < sectors_.size(); ++sector) {
-    parts_[sector] = {};
-    const SectorBook::Entry& entry = sectors_[sector];
-    const auto own = plane_.own(sector);
-    if (sectors_.IsUsable(sector) && Looks(sector)) {
-      const SectorExposure& asked = *entry.exposure;
-      parts_[sector] = {entry.report->incarnation, asked.id};
-      Spread(asked.expected, own, &job.expected);
-      Spread(asked.before, own, &job.before);
-      Spread(asked.reported, own, &job.reported);
-      Spread(asked.seen, own, &job.seen);
-      Spread(asked.wanted, own, &job.wanted);
-      Spread(asked.drives, own, &exposure.drives);
-      job.tolerance_um = std::max(job.tolerance_um, asked.tolerance_um);
-    } else if (const auto standing = StandingJob(sector)) {
-      Spread(standing->start, own, &job.expected);
-      Spread(standing->drives, own, &exposure.drives);
-    }  // of all others nothing is known, and they are seen anywhere
-  }
-  view_.state = ConfigurationState::kMoving;
-  view_.waiting_for = "the camera";
-  out_->exposure = std::move(exposure);
-  Enter(PlanePhase::kMeasuring);
-}
-
-void PlaneCoordinator::TakeExposure(const ExposureDone& done) {
-  if (view_.phase != PlanePhase::kMeasuring || done.id != exposure_) return;
-  view_.waiting_for.clear();
-  tries_ = 0;
-  view_.not_measured = done.exposure ? std::string() : done.exposure.error().text;
-  for (std::uint32_t sector = 0; sector < sectors_.size(); ++sector) {
-    const std::uint64_t asked = parts_[sector].job;
-    const SectorBook::Entry& entry = sectors_[sector];
-    if (asked == 0 || !sectors_.IsUsable(sector) || !Looks(sector) ||
-        entry.report->incarnation != parts_[sector].incarnation || entry.exposure->id != asked)
-      continue;
-    auto findings = std::make_shared<Result<ExposureFindings>>();
-    if (done.exposure)
-      *findings = PartOf(*done.exposure, plane_, sector, asked);
-    else
-      *findings = tl::unexpected(done.exposure.error());
-    sectors_.Order(sector, {.kind = OrderKind::kFindings,
-                            .configuration = Id(),
-                            .job = asked,
-                            .findings = std::move(findings)});
-  }
-  if (done.exposure) Summarise(*done.exposure);
-  Enter(PlanePhase::kGathering);
-}
-
-/// Notes how far the units are from their targets. An exposure before any motion says nothing.
-void PlaneCoordinator::Summarise(const ExposureFindings& findings) {
+MeasuredRound SummaryOf(const ExposureFindings& findings, const PlaneConfiguration& configuration,
+                        const PlaneLayout& plane, const SectorBook& sectors,
+                        const PlaneConfigurationId& id) {
   MeasuredRound round{.exposure = findings.id, .camera = findings.camera};
-  const double tolerance_um =
-      record_.under_way->measure ? record_.under_way->measure->tolerance_um : 10;
+  const double tolerance_um = configuration.measure.value_or(ApplyCommand::Measure{}).tolerance_um;
   std::vector<double> errors_um;
   for (const Measurement& measurement : findings.measurements) {
-    const std::uint32_t sector = plane_.SectorOf(measurement.unit);
-    const auto& asked = sectors_[sector].exposure;
-    const std::optional<Pose>& target = record_.under_way->targets[measurement.unit.value];
-    if (parts_[sector].job == 0 || asked == nullptr || asked->first || !target) continue;
+    const std::uint32_t sector = plane.SectorOf(measurement.unit);
+    const std::optional<Pose>& target = configuration.targets[measurement.unit.value];
+    if (!target || !Looks(sectors, sector, id) || sectors[sector].exposure->first) continue;
     if (!IsCertain(measurement.status) || !measurement.place) {
       ++round.unknown;
       continue;
     }
-    const PointFp wanted = FibreAt(plane_.layout().unit(measurement.unit),
-                                   asked->drives[plane_.Local(measurement.unit).value], *target);
+    const UnitDrive& drive = sectors[sector].exposure->drives[plane.Local(measurement.unit).value];
+    const PointFp wanted = FibreAt(plane.layout().unit(measurement.unit), drive, *target);
     ++round.measured;
     errors_um.push_back(1e3 *
                         std::hypot(measurement.x_mm - wanted.x_mm, measurement.y_mm - wanted.y_mm));
     if (errors_um.back() <= tolerance_um) ++round.within_tolerance;
   }
-  if (round.measured + round.unknown == 0) return;
-  if (!errors_um.empty()) {
-    double sum = 0;
-    for (const double um : errors_um) sum += um * um;
-    std::ranges::sort(errors_um);
-    round.rms_um = std::sqrt(sum / static_cast<double>(errors_um.size()));
-    round.median_um = errors_um[errors_um.size() / 2];
-    round.worst_um = errors_um.back();
-  }
-  view_.measured.push_back(round);
+  if (errors_um.empty()) return round;
+  double sum = 0;
+  for (const double um : errors_um) sum += um * um;
+  std::ranges::sort(errors_um);
+  round.rms_um = std::sqrt(sum / static_cast<double>(errors_um.size()));
+  round.median_um = errors_um[errors_um.size() / 2];
+  round.worst_um = errors_um.back();
+  return round;
 }
 
 }  // namespace focalfleet

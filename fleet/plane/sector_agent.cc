@@ -208,7 +208,12 @@ bool SectorAgent::Do(const PlaneOrder& order) {
     case OrderKind::kRetarget:
       return Retarget(order);
     case OrderKind::kFindings:
-      return TakeFindings(order);
+      if (in_->view.stage != SectorStage::kLooking || exposure_ == nullptr ||
+          exposure_->id != order.job)
+        return true;
+      if (order.findings == nullptr) return false;
+      Send(SectorFindings{order.job, *order.findings});
+      return true;
   }
   return true;
 }
@@ -234,15 +239,6 @@ bool SectorAgent::Retarget(const PlaneOrder& order) {
     if (retarget.number > here_.change) command.targets.push_back(retarget.target);
   here_.change = std::max(here_.change, order.change);
   if (!command.targets.empty()) Send(std::move(command));
-  return true;
-}
-
-bool SectorAgent::TakeFindings(const PlaneOrder& order) {
-  if (in_->view.stage != SectorStage::kLooking || exposure_ == nullptr ||
-      exposure_->id != order.job)
-    return true;
-  if (order.findings == nullptr) return false;
-  Send(SectorFindings{order.job, *order.findings});
   return true;
 }
 

@@ -134,7 +134,6 @@ class SectorAgent {
   [[nodiscard]] bool Configure(const PlaneOrder& order);
   [[nodiscard]] bool TakeRound(const PlaneOrder& order);
   [[nodiscard]] bool Retarget(const PlaneOrder& order);
-  [[nodiscard]] bool TakeFindings(const PlaneOrder& order);
   void Confirm();
   [[nodiscard]] std::string WhoIsMissing() const;
   void GiveBack(const std::string& why);

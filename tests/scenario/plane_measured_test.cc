@@ -30,40 +30,40 @@ double ErrorUm(PlaneInProcess* plane, PositionerIndex i, const Pose& target) {
   return 1e3 * std::hypot(truth.x_mm - aim.x_mm, truth.y_mm - aim.y_mm);
 }
 
-class MeasuredPlane : public PlaneInProcess {
- public:
-  explicit MeasuredPlane(std::uint64_t seed) : PlaneInProcess(Measured(seed)), judge_(this) {
-    commanded = [this](std::uint32_t sector, const SectorAgent& agent, const Command& command) {
-      judge_.Commanded(sector, agent, command);
-    };
-    looked = [this] { judge_.Look(); };
-    EXPECT_TRUE(RunUntil([this] { return IsIdle(); }, Seconds(20)));
-    Run(Seconds(5));
+/// A plane, and the judgement of all that happens in it.
+struct Judged {
+  explicit Judged(std::uint64_t seed) : plane(Measured(seed)), judge(&plane) {
+    plane.commanded = [this](std::uint32_t sector, const SectorAgent& agent,
+                             const Command& command) { judge.Commanded(sector, agent, command); };
+    plane.looked = [this] { judge.Look(); };
+    EXPECT_TRUE(plane.RunUntil([this] { return plane.IsIdle(); }, Seconds(20)));
+    plane.Run(Seconds(5));
   }
-  ~MeasuredPlane() {
-    for (const std::string& broken : judge_.broken()) ADD_FAILURE() << broken;
+  ~Judged() {
+    for (const std::string& broken : judge.broken()) ADD_FAILURE() << broken;
   }
-  std::uint64_t ApplyMeasured(const std::vector<std::optional<Pose>>& targets,
-                              std::uint8_t corrections) {
-    return Give(PlaneApplyCommand{
-        "test", false, targets, {}, ApplyCommand::Measure{corrections, 10, false}});
-  }
-  bool Finish() {
-    return RunUntil([this] { return !IsIdle(); }, Seconds(5)) &&
-           RunUntil([this] { return IsIdle(); }, Seconds(2000));
-  }
-
- private:
-  test::PlaneJudge judge_;
+  PlaneInProcess plane;
+  test::PlaneJudge judge;
 };
+
+void ApplyMeasured(PlaneInProcess* plane, const std::vector<std::optional<Pose>>& targets,
+                   std::uint8_t corrections) {
+  plane->Give(
+      PlaneApplyCommand{"test", false, targets, {}, ApplyCommand::Measure{corrections, 10, false}});
+}
+bool Finish(PlaneInProcess* plane) {
+  return plane->RunUntil([plane] { return !plane->IsIdle(); }, Seconds(5)) &&
+         plane->RunUntil([plane] { return plane->IsIdle(); }, Seconds(2000));
+}
 
 TEST(MeasuredPlane, CorrectsItsUnitsInRoundsOfThePlane) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     FOCALFLEET_TRACE_SEED(seed);
-    MeasuredPlane plane(seed);
+    Judged judged(seed);
+    PlaneInProcess& plane = judged.plane;
     const auto targets = plane.DrawTargets(seed);
-    plane.ApplyMeasured(targets, 2);
-    ASSERT_TRUE(plane.Finish());
+    ApplyMeasured(&plane, targets, 2);
+    ASSERT_TRUE(Finish(&plane));
     const PlaneView& view = plane.plane().view();
     EXPECT_EQ(view.state, ConfigurationState::kDone);
     EXPECT_EQ(view.not_measured, "");
@@ -71,7 +71,7 @@ TEST(MeasuredPlane, CorrectsItsUnitsInRoundsOfThePlane) {
     EXPECT_EQ(view.measured.front().measured, targets.size());
     // A unit that finds no way stays far off.
     EXPECT_LT(view.measured.back().median_um, view.measured.front().median_um / 2);
-    // What the plane says is true.
+    // The plane reports no more than the truth.
     std::uint32_t within = 0;
     for (std::uint32_t n = 0; n < targets.size(); ++n) {
       const double error_um = ErrorUm(&plane, {n}, *targets[n]);
@@ -87,15 +87,16 @@ TEST(MeasuredPlane, CorrectsItsUnitsInRoundsOfThePlane) {
 }
 
 TEST(MeasuredPlane, MeasuresWithoutMotion) {
-  MeasuredPlane plane(4);
+  Judged judged(4);
+  PlaneInProcess& plane = judged.plane;
   const auto targets = plane.DrawTargets(4);
-  plane.ApplyMeasured(targets, 0);
-  ASSERT_TRUE(plane.Finish());
+  ApplyMeasured(&plane, targets, 0);
+  ASSERT_TRUE(Finish(&plane));
   std::vector<std::uint32_t> begun;
   for (std::uint32_t n = 0; n < targets.size(); ++n)
     begun.push_back(plane.world().Truth(n).moves_begun);
   const std::uint64_t request = plane.Give(PlaneMeasureCommand{});
-  ASSERT_TRUE(plane.Finish());
+  ASSERT_TRUE(Finish(&plane));
   EXPECT_EQ(plane.plane().view().kind, ConfigurationKind::kMeasure);
   EXPECT_EQ(plane.plane().view().counts.targeted, targets.size());
   EXPECT_EQ(plane.plane().view().counts.arrived, targets.size());
@@ -107,7 +108,8 @@ TEST(MeasuredPlane, MeasuresWithoutMotion) {
 
 // A unit that has lost its place is found by the camera before anything moves.
 TEST(MeasuredPlane, FindsAUnitOfUnknownPlaceFirst) {
-  MeasuredPlane plane(5);
+  Judged judged(5);
+  PlaneInProcess& plane = judged.plane;
   const PositionerIndex lost{plane.layout().own(1)[2]};
   const UnitId id = plane.layout().layout().unit(lost).id;
   plane.Apply(plane.DrawTargets(50));
@@ -120,17 +122,18 @@ TEST(MeasuredPlane, FindsAUnitOfUnknownPlaceFirst) {
   ASSERT_TRUE(plane.RunUntil([&] { return plane.IsIdle(); }, Seconds(400)));
   plane.Run(Seconds(10));
   ASSERT_FALSE(IsPlace(plane.unit(lost).knowledge));
-  plane.ApplyMeasured(plane.DrawTargets(51), 1);
-  ASSERT_TRUE(plane.Finish());
+  ApplyMeasured(&plane, plane.DrawTargets(51), 1);
+  ASSERT_TRUE(Finish(&plane));
   EXPECT_TRUE(IsPlace(plane.unit(lost).knowledge));
   EXPECT_NE(plane.unit(lost).outcome, TargetOutcome::kRefused) << plane.unit(lost).outcome_reason;
 }
 
 TEST(MeasuredPlane, GoesOnAfterKillsWhileTheCameraLooks) {
   for (const bool of_sector : {false, true}) {
-    MeasuredPlane plane(6);
+    Judged judged(6);
+    PlaneInProcess& plane = judged.plane;
     const auto targets = plane.DrawTargets(6);
-    plane.ApplyMeasured(targets, 1);
+    ApplyMeasured(&plane, targets, 1);
     ASSERT_TRUE(plane.RunUntil([&] { return plane.plane().view().phase == PlanePhase::kMeasuring; },
                                Seconds(400)));
     if (of_sector) plane.KillSector(1);
@@ -145,18 +148,19 @@ TEST(MeasuredPlane, GoesOnAfterKillsWhileTheCameraLooks) {
 }
 
 TEST(MeasuredPlane, AnExposureThatCannotBeUsedIsTriedAgain) {
-  MeasuredPlane plane(7);
+  Judged judged(7);
+  PlaneInProcess& plane = judged.plane;
   int failures = 1;
   plane.planes[0].camera.fault = [&](ExposureDone* done) {
     if (failures-- > 0) done->exposure = Fail(ErrorCode::kRefused, "too few fiducials");
   };
-  plane.ApplyMeasured(plane.DrawTargets(7), 0);
-  ASSERT_TRUE(plane.Finish());
+  ApplyMeasured(&plane, plane.DrawTargets(7), 0);
+  ASSERT_TRUE(Finish(&plane));
   EXPECT_EQ(plane.plane().view().measured.size(), 1u);
   EXPECT_EQ(plane.plane().view().not_measured, "");
   failures = 100;
-  plane.ApplyMeasured(plane.DrawTargets(8), 0);
-  ASSERT_TRUE(plane.Finish());
+  ApplyMeasured(&plane, plane.DrawTargets(8), 0);
+  ASSERT_TRUE(Finish(&plane));
   EXPECT_EQ(plane.plane().view().measured.size(), 0u);
   EXPECT_EQ(plane.plane().view().not_measured, "too few fiducials");
   EXPECT_EQ(plane.plane().view().counts.arrived, 0u);

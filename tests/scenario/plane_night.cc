@@ -308,7 +308,7 @@ class Night {
     if (!plane_.RunUntil([this] { return plane_.IsIdle(); }, Seconds(400)))
       Broken("the first configuration does not end: " + std::string(Name(*Phase())) +
              ", waits for " + plane_.plane().view().waiting_for);
-    plane_.Run(Seconds(8));  // a sector's next life is told of the configuration
+    plane_.Run(Seconds(8));  // a sector's next life hears of the configuration
     LookAtFates();
     // An operator clears the faults of units.
     for (const PositionerIndex i : halted_) {

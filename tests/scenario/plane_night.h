@@ -1,5 +1,5 @@
-// A night of a plane: one seed draws the plane, the weather of its network, a task, and one to three
-// faults, each in a phase of the task. The task is a configuration, which may be measured and
+// A night of a plane: one seed draws the plane, the weather of its network, a task, and one to
+// three faults, each in a phase of the task. The task is a configuration, which may be measured and
 // corrected, and in which some units may get other targets, or it is the homing of some units. Then
 // all faults end, and the plane must carry out another configuration whole. The same seed gives the
 // same night.

@@ -16,103 +16,102 @@ namespace {
 
 using test::PlaneInProcess;
 
-/// A plane, and what a judge says of all that happens in it.
-class JudgedPlane : public PlaneInProcess {
- public:
-  explicit JudgedPlane(std::uint64_t seed)
-      : PlaneInProcess(
-            {.sectors = 3, .units_per_sector = 8, .seed = seed, .times = {}, .agent = {}}),
-        judge_(this) {
-    commanded = [this](std::uint32_t sector, const SectorAgent& agent, const Command& command) {
-      judge_.Commanded(sector, agent, command);
-    };
-    looked = [this] {
-      judge_.Look();
+UnitState StateOf(PlaneInProcess* plane, PositionerIndex i) {
+  return plane->world().Truth(i.value).state;
+}
+
+/// A plane, and the judgement of all that happens in it.
+struct Judged {
+  explicit Judged(std::uint64_t seed)
+      : plane({.sectors = 3, .units_per_sector = 8, .seed = seed, .times = {}, .agent = {}}),
+        judge(&plane) {
+    plane.commanded = [this](std::uint32_t sector, const SectorAgent& agent,
+                             const Command& command) { judge.Commanded(sector, agent, command); };
+    plane.looked = [this] {
+      judge.Look();
       LookAtHoming();
     };
-    EXPECT_TRUE(RunUntil([this] { return IsIdle(); }, Seconds(20)));
-    Run(Seconds(5));
+    EXPECT_TRUE(plane.RunUntil([this] { return plane.IsIdle(); }, Seconds(20)));
+    plane.Run(Seconds(5));
   }
-  ~JudgedPlane() {
-    judge_.LookAtStores();
-    for (const std::string& broken : judge_.broken()) ADD_FAILURE() << broken;
+  ~Judged() {
+    judge.LookAtStores();
+    for (const std::string& broken : judge.broken()) ADD_FAILURE() << broken;
   }
-
-  bool Finish() {
-    return RunUntil([this] { return !IsIdle(); }, Seconds(5)) &&
-           RunUntil([this] { return IsIdle(); }, Seconds(600));
-  }
-  /// A unit of the sector that one of another sector can reach.
-  PositionerIndex AtBorder(std::uint32_t sector) const {
-    const auto own = layout().own(sector);
-    const auto it = std::ranges::find_if(
-        own, [this](PositionerIndex i) { return !layout().beyond(i).empty(); });
-    return *it;
-  }
-  [[nodiscard]] UnitState StateOf(PositionerIndex i) { return world().Truth(i.value).state; }
-  bool RunUntilIn(PositionerIndex i, UnitState state, DurationNs limit = Seconds(100)) {
-    return RunUntil([&] { return StateOf(i) == state; }, limit);
-  }
-  /// The unit loses its place: its power is cut in mid-move.
-  void Lose(PositionerIndex i, std::uint64_t seed) {
-    const UnitId id = layout().layout().unit(i).id;
-    Apply(DrawTargets(seed));
-    ASSERT_TRUE(RunUntilIn(i, UnitState::kMoving));
-    Run(Seconds(1));
-    world().disturb().PowerCut(id);
-    Run(Seconds(3));
-    world().disturb().PowerOn(id);
-    ASSERT_TRUE(RunUntil([this] { return IsIdle(); }, Seconds(400)));
-    Run(Seconds(10));
-    ASSERT_FALSE(IsPlace(unit(i).knowledge));
-  }
-
-  std::uint32_t homed = 0;  // looks at which a unit homed
-
- private:
   /// Every unit in reach of one that homes stands.
   void LookAtHoming() {
-    const auto state = [this](PositionerIndex i) { return world().Truth(i.value).state; };
-    for (std::uint32_t n = 0; n < layout().layout().size(); ++n) {
-      if (state({n}) != UnitState::kHoming) continue;
+    for (std::uint32_t n = 0; n < plane.layout().layout().size(); ++n) {
+      if (StateOf(&plane, {n}) != UnitState::kHoming) continue;
       ++homed;
-      for (const PositionerIndex other : layout().layout().neighbours({n}))
-        if (state(other) == UnitState::kMoving || state(other) == UnitState::kHoming)
+      for (const PositionerIndex other : plane.layout().layout().neighbours({n})) {
+        const UnitState state = StateOf(&plane, other);
+        if (state == UnitState::kMoving || state == UnitState::kHoming)
           ADD_FAILURE() << "a unit moves in reach of one that homes";
+      }
     }
   }
 
-  test::PlaneJudge judge_;
+  PlaneInProcess plane;
+  test::PlaneJudge judge;
+  std::uint32_t homed = 0;  // looks at which a unit homed
 };
+
+bool Finish(PlaneInProcess* plane) {
+  return plane->RunUntil([plane] { return !plane->IsIdle(); }, Seconds(5)) &&
+         plane->RunUntil([plane] { return plane->IsIdle(); }, Seconds(600));
+}
+bool RunUntilIn(PlaneInProcess* plane, PositionerIndex i, UnitState state) {
+  return plane->RunUntil([&] { return StateOf(plane, i) == state; }, Seconds(100));
+}
+/// A unit of the sector that one of another sector can reach.
+PositionerIndex AtBorder(const PlaneInProcess& plane, std::uint32_t sector) {
+  const auto own = plane.layout().own(sector);
+  return *std::ranges::find_if(
+      own, [&](PositionerIndex i) { return !plane.layout().beyond(i).empty(); });
+}
+/// The unit loses its place: its power is cut in mid-move.
+void Lose(PlaneInProcess* plane, PositionerIndex i, std::uint64_t seed) {
+  const UnitId id = plane->layout().layout().unit(i).id;
+  plane->Apply(plane->DrawTargets(seed));
+  ASSERT_TRUE(RunUntilIn(plane, i, UnitState::kMoving));
+  plane->Run(Seconds(1));
+  plane->world().disturb().PowerCut(id);
+  plane->Run(Seconds(3));
+  plane->world().disturb().PowerOn(id);
+  ASSERT_TRUE(plane->RunUntil([plane] { return plane->IsIdle(); }, Seconds(400)));
+  plane->Run(Seconds(10));
+  ASSERT_FALSE(IsPlace(plane->unit(i).knowledge));
+}
 
 TEST(PlaneTasks, AUnitAtABorderIsHomed) {
   std::uint32_t without_way = 0;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     FOCALFLEET_TRACE_SEED(seed);
-    JudgedPlane plane(seed);
-    const PositionerIndex lost = plane.AtBorder(1);
-    plane.Lose(lost, seed);
+    Judged judged(seed);
+    PlaneInProcess& plane = judged.plane;
+    const PositionerIndex lost = AtBorder(plane, 1);
+    Lose(&plane, lost, seed);
     const std::uint64_t request = plane.Give(PlaneHomeCommand{{lost}});
-    ASSERT_TRUE(plane.Finish());
+    ASSERT_TRUE(Finish(&plane));
     const PlaneView& view = plane.plane().view();
     EXPECT_EQ(view.kind, ConfigurationKind::kHome);
     // Some plates leave no room to step aside; then nothing moves.
     if (view.state == ConfigurationState::kFailed) {
       EXPECT_NE(plane.unit(lost).outcome_reason.find("cannot home"), std::string::npos);
-      EXPECT_EQ(plane.homed, 0u);
+      EXPECT_EQ(judged.homed, 0u);
       ++without_way;
       continue;
     }
     EXPECT_EQ(view.state, ConfigurationState::kDone);
     EXPECT_EQ(view.counts.targeted, 1u);
     EXPECT_EQ(view.counts.arrived, 1u) << plane.unit(lost).outcome_reason;
-    EXPECT_GT(plane.homed, 0u);
+    EXPECT_GT(judged.homed, 0u);
     ASSERT_NE(plane.ReplyTo(request), nullptr);
     EXPECT_FALSE(plane.ReplyTo(request)->error);
     EXPECT_TRUE(IsPlace(plane.unit(lost).knowledge));
     const auto targets = plane.DrawTargets(100 + seed);
     plane.Apply(targets);
-    ASSERT_TRUE(plane.Finish());
+    ASSERT_TRUE(Finish(&plane));
     EXPECT_EQ(plane.plane().view().counts.arrived, targets.size());
   }
   EXPECT_LE(without_way, 1u);
@@ -120,23 +119,25 @@ TEST(PlaneTasks, AUnitAtABorderIsHomed) {
 
 // Neighbours home one after the other, and others make way for them over borders.
 TEST(PlaneTasks, AllUnitsAreHomed) {
-  JudgedPlane plane(4);
+  Judged judged(4);
+  PlaneInProcess& plane = judged.plane;
   PlaneHomeCommand home;
   for (std::uint32_t n = 0; n < plane.layout().layout().size(); ++n) home.units.push_back({n});
   plane.Give(home);
-  ASSERT_TRUE(plane.Finish());
+  ASSERT_TRUE(Finish(&plane));
   EXPECT_EQ(plane.plane().view().state, ConfigurationState::kDone);
   EXPECT_EQ(plane.plane().view().counts.arrived, home.units.size());
 }
 
 TEST(PlaneTasks, AUnitBesideASectorThatIsNotThereIsNotHomed) {
-  JudgedPlane plane(2);
-  const PositionerIndex unit = plane.AtBorder(0);
+  Judged judged(2);
+  PlaneInProcess& plane = judged.plane;
+  const PositionerIndex unit = AtBorder(plane, 0);
   plane.KillSector(plane.layout().beyond(unit)[0]);
   plane.Run(Seconds(5));
   plane.Give(PlaneHomeCommand{{unit}});
-  ASSERT_TRUE(plane.Finish());
-  EXPECT_EQ(plane.homed, 0u);
+  ASSERT_TRUE(Finish(&plane));
+  EXPECT_EQ(judged.homed, 0u);
   EXPECT_EQ(plane.unit(unit).outcome, TargetOutcome::kRefused);
   EXPECT_EQ(plane.unit(unit).outcome_reason, "a sector in its reach takes no part");
   // Units of the sector that is not there are refused at once.
@@ -151,10 +152,11 @@ TEST(PlaneTasks, AUnitBesideASectorThatIsNotThereIsNotHomed) {
 
 TEST(PlaneTasks, HomingGoesOnAfterAKillOfTheCoordinatorOrTheSector) {
   for (const bool of_sector : {false, true}) {
-    JudgedPlane plane(3);
-    const PositionerIndex unit = plane.AtBorder(1);
+    Judged judged(3);
+    PlaneInProcess& plane = judged.plane;
+    const PositionerIndex unit = AtBorder(plane, 1);
     plane.Give(PlaneHomeCommand{{unit}});
-    ASSERT_TRUE(plane.RunUntilIn(unit, UnitState::kHoming));
+    ASSERT_TRUE(RunUntilIn(&plane, unit, UnitState::kHoming));
     plane.Run(Seconds(1));
     if (of_sector) plane.KillSector(1);
     if (!of_sector) plane.KillPlane();
@@ -169,16 +171,17 @@ TEST(PlaneTasks, HomingGoesOnAfterAKillOfTheCoordinatorOrTheSector) {
 }
 
 TEST(PlaneTasks, AStopEndsHoming) {
-  JudgedPlane plane(5);
-  const PositionerIndex unit = plane.AtBorder(1);
+  Judged judged(5);
+  PlaneInProcess& plane = judged.plane;
+  const PositionerIndex unit = AtBorder(plane, 1);
   plane.Give(PlaneHomeCommand{{unit}});
-  ASSERT_TRUE(plane.RunUntilIn(unit, UnitState::kHoming));
+  ASSERT_TRUE(RunUntilIn(&plane, unit, UnitState::kHoming));
   plane.Run(Seconds(1));
   plane.Stop();
   ASSERT_TRUE(plane.RunUntil([&] { return plane.IsIdle(); }, Seconds(30)));
   EXPECT_EQ(plane.plane().view().state, ConfigurationState::kStopped);
   plane.Run(Seconds(2));
-  EXPECT_NE(plane.StateOf(unit), UnitState::kHoming);
+  EXPECT_NE(StateOf(&plane, unit), UnitState::kHoming);
 }
 
 /// The unit's arm is at `pose`.
@@ -193,13 +196,14 @@ bool IsAt(PlaneInProcess* plane, PositionerIndex i, const Pose& pose) {
 TEST(PlaneTasks, AUnitGoesToAnotherTargetInTheNextRound) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     FOCALFLEET_TRACE_SEED(seed);
-    JudgedPlane plane(seed);
-    const PositionerIndex unit = plane.AtBorder(1);
+    Judged judged(seed);
+    PlaneInProcess& plane = judged.plane;
+    const PositionerIndex unit = AtBorder(plane, 1);
     const auto targets = plane.DrawTargets(seed);
     // The place where the unit stands is free in any configuration of the others that leads there.
     const Pose other = PlaceOf(plane.unit(unit).knowledge);
     plane.Apply(targets);
-    ASSERT_TRUE(plane.RunUntilIn(unit, UnitState::kMoving));
+    ASSERT_TRUE(RunUntilIn(&plane, unit, UnitState::kMoving));
     plane.Run(Seconds(2));
     const std::uint64_t request = plane.Give(PlaneRetargetCommand{unit, other});
     plane.Run(Seconds(1));
@@ -210,7 +214,7 @@ TEST(PlaneTasks, AUnitGoesToAnotherTargetInTheNextRound) {
     EXPECT_EQ(view.rounds, 2u);
     const UnitView& end = plane.unit(unit);
     EXPECT_EQ(end.target, other);
-    // Another unit may stand in its way by then; it is told so, and stays where it is.
+    // Another unit may stand in its way by then; it is refused then, and stays where it is.
     if (end.outcome == TargetOutcome::kArrived)
       EXPECT_TRUE(IsAt(&plane, unit, other));
     else
@@ -220,12 +224,13 @@ TEST(PlaneTasks, AUnitGoesToAnotherTargetInTheNextRound) {
 }
 
 TEST(PlaneTasks, OtherTargetsAreNotForgottenWithAKill) {
-  JudgedPlane plane(6);
-  const PositionerIndex unit = plane.AtBorder(1);
+  Judged judged(6);
+  PlaneInProcess& plane = judged.plane;
+  const PositionerIndex unit = AtBorder(plane, 1);
   const auto targets = plane.DrawTargets(6);
   const Pose other = PlaceOf(plane.unit(unit).knowledge);
   plane.Apply(targets);
-  ASSERT_TRUE(plane.RunUntilIn(unit, UnitState::kMoving));
+  ASSERT_TRUE(RunUntilIn(&plane, unit, UnitState::kMoving));
   plane.Run(Seconds(2));
   const std::uint64_t request = plane.Give(PlaneRetargetCommand{unit, other});
   ASSERT_TRUE(plane.RunUntil([&] { return plane.ReplyTo(request) != nullptr; }, Seconds(5)));
@@ -240,7 +245,8 @@ TEST(PlaneTasks, OtherTargetsAreNotForgottenWithAKill) {
 }
 
 TEST(PlaneTasks, NoOtherTargetsWithoutAConfiguration) {
-  JudgedPlane plane(7);
+  Judged judged(7);
+  PlaneInProcess& plane = judged.plane;
   const std::uint64_t request = plane.Give(PlaneRetargetCommand{{3}, {1, 1}});
   plane.Run(Seconds(1));
   ASSERT_NE(plane.ReplyTo(request), nullptr);

@@ -92,7 +92,12 @@ class PageStreamTest : public ::testing::Test {
         .tokens =
             std::make_shared<TokenRegister>(TokenRegister::Options{.path = folder_ / "tokens.csv"}),
         .viewer_without_token = viewer_without_token});
-    AddPageRoutes({&layout_, &feed_, &plans_, &night_, &diagnosis_, folder_ / "none.db"},
+    AddPageRoutes({.layout = &layout_,
+                   .feed = &feed_,
+                   .plans = &plans_,
+                   .night = &night_,
+                   .diagnosis = &diagnosis_,
+                   .store = folder_ / "none.db"},
                   router.get());
     server_ = std::make_unique<HttpServer>(
         HttpServer::Options{.address = "127.0.0.1", .router = std::move(router), .limits = limits});

@@ -153,8 +153,8 @@ TEST(PlaneCoordinator, GoesOnWithTheConfigurationOfItsEarlierLife) {
   }
 }
 
-// Units that have arrived are told as arrived by the next life of their sector, too.
-TEST(PlaneCoordinator, TellsANewLifeOfASectorOfTheLastConfiguration) {
+// Units that have arrived are reported as arrived by the next life of their sector, too.
+TEST(PlaneCoordinator, LetsANewLifeOfASectorHearOfTheLastConfiguration) {
   PlaneRecord kept{.epoch = {3, kSelf}, .next_configuration = 6, .under_way = {}};
   kept.last = PlaneConfiguration{.id = 5, .source = "test"};
   kept.last->targets.assign(20, Pose{4, 4});
@@ -165,7 +165,7 @@ TEST(PlaneCoordinator, TellsANewLifeOfASectorOfTheLastConfiguration) {
   bench.Step(0.3);
   bench.Step(0.3);
   EXPECT_EQ(bench.orders[0].kind, OrderKind::kStand);
-  EXPECT_EQ(bench.view().counts.arrived, 10u) << "the other sector has told nothing yet";
+  EXPECT_EQ(bench.view().counts.arrived, 10u) << "the other sector has reported nothing yet";
   ASSERT_EQ(bench.orders[1].kind, OrderKind::kConfigure);
   EXPECT_EQ(bench.orders[1].configuration, (PlaneConfigurationId{kSelf, 5}));
   // The sector asks; nothing moves, and only what does not stand at its target is refused.
