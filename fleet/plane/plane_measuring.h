@@ -30,8 +30,8 @@ bool Looks(const SectorBook& sectors, std::uint32_t sector, const PlaneConfigura
 std::shared_ptr<const SectorJob> StandingJob(const SectorBook& sectors, std::uint32_t sector,
                                              const PlaneConfigurationId& id);
 
-/// The job for all sectors that ask. Of sectors whose units are not known to stand nothing is
-/// believed: their units are seen anywhere.
+/// The job for all sectors that ask. Nothing is believed of sectors whose units are not known to
+/// stand: these units are seen anywhere.
 PlaneExposure MakeExposure(std::uint64_t number, HostInstant now, const PlaneLayout& plane,
                            const SectorBook& sectors, const PlaneConfigurationId& id);
 

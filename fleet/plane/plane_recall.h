@@ -1,7 +1,7 @@
 // The outcomes of the configuration under way, or of the last one, over all sectors. The report of
-// a sector that has begun another life since counts until that life knows better: it hears of the
-// last configuration, asks as usual, and is answered that nothing moves. It then knows, and
-// reports, which of its units stand at their targets.
+// a sector that has begun another life since counts until that life knows better: the new life hears
+// of the last configuration, asks as usual, and is answered that nothing moves. The sector then
+// knows, and reports, which of its units stand at their targets.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ class PlaneRecall {
   void Begin();
   /// Brings the counts of the view up to date.
   void Count();
-  /// Nothing is under way: sectors stand, and new lives hear of the last configuration. One that
-  /// the coordinator does not know is stopped.
+  /// Nothing is under way: sectors stand, and new lives hear of the last configuration. Another
+  /// configuration, which the coordinator does not know, is stopped.
   void Idle();
 
  private:
