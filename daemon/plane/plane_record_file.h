@@ -1,5 +1,6 @@
 // The file of a plane's coordinator: its number, its epoch, the configuration under way, and the
-// last one that is over. The file is replaced as a whole, at most three times a configuration.
+// last one that is over. The file is replaced as a whole, at most three times a
+// configuration, and once for each change of a target.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // The outcomes of the configuration under way, or of the last one, over all sectors. The report of
-// a sector that has begun another life since counts until that life knows better: the new life hears
-// of the last configuration, asks as usual, and is answered that nothing moves. The sector then
-// knows, and reports, which of its units stand at their targets.
+// a sector that has begun another life since counts until that life knows better: the new life
+// hears of the last configuration, asks as usual, and is answered that nothing moves. The sector
+// then knows, and reports, which of its units stand at their targets.
 #pragma once
 
 #include <cstdint>

@@ -29,6 +29,8 @@ double LastsAbout(PlanePhase phase) {
       return 0.25;
     case PlanePhase::kFinishing:
       return 0.02;
+    case PlanePhase::kMeasuring:
+      return 0.5;
     default:
       return 1.2;
   }
@@ -58,11 +60,9 @@ class Night {
     if (!plane_.RunUntil([this] { return plane_.IsIdle(); }, Seconds(30)))
       Broken("no coordinator takes charge");
     const auto first = plane_.DrawTargets(2 * options_.seed);
-    const bool homes = !options_.fault && tasks_.Uniform() < 0.25;
-    const bool measures = !options_.fault && !homes && tasks_.Uniform() < 0.25;
-    if (homes)
+    if (homes_)
       plane_.Give(PlaneHomeCommand{DrawUnits(), false});
-    else if (measures)
+    else if (measures_)
       plane_.Give(PlaneApplyCommand{"test", false, first, {}, ApplyCommand::Measure{1, 10, false}});
     else
       plane_.Apply(first);
@@ -74,7 +74,7 @@ class Night {
     if (retargets && plane_.planes[0].coordinator != nullptr) Retarget();
     plane_.Run(Seconds(lasts_s - retargets_after_s));
     // Counts of a configuration are history where another coordinator has moved units since.
-    if (plane_.IsIdle() && !second_ && !homes && !retargets && !measures)
+    if (plane_.IsIdle() && !second_ && !homes_ && !retargets && !measures_)
       judge_.LookAtArrivals(first);
     Heal();
     const auto second = plane_.DrawTargets(2 * options_.seed + 1);
@@ -101,6 +101,8 @@ class Night {
       Armed armed;
       armed.fault = options_.fault.value_or(static_cast<PlaneFault>(rng_.Below(kPlaneFaultCount)));
       armed.phase = options_.fault ? options_.phase : kPhases[rng_.Below(std::size(kPhases))];
+      if (!options_.fault && measures_ && tasks_.Uniform() < 0.4)
+        armed.phase = PlanePhase::kMeasuring;
       const bool motion = armed.phase == PlanePhase::kMoving;
       // Half of the faults in motion strike around the start, the others anywhere in it.
       armed.after_s = options_.fault                   ? options_.after_s
@@ -391,6 +393,9 @@ class Night {
   const PlaneNightOptions options_;
   Rng rng_;
   Rng tasks_ = Rng::Stream(options_.seed, "tasks");
+  const bool homes_ = !options_.fault && tasks_.Uniform() < 0.25;
+  const bool measures_ = options_.fault ? options_.phase == PlanePhase::kMeasuring
+                                        : !homes_ && tasks_.Uniform() < 0.25;
   PlaneInProcess plane_;
   PlaneJudge judge_;
   std::vector<Armed> armed_faults_;

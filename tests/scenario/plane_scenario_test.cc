@@ -194,7 +194,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Combine(::testing::Range(0, static_cast<int>(kPlaneFaultCount)),
                        ::testing::Values(PlanePhase::kRecording, PlanePhase::kGathering,
                                          PlanePhase::kPlanning, PlanePhase::kPreparing,
-                                         PlanePhase::kMoving, PlanePhase::kFinishing)),
+                                         PlanePhase::kMoving, PlanePhase::kFinishing,
+                                         PlanePhase::kMeasuring)),
     [](const auto& one) {
       return std::string(test::Name(static_cast<PlaneFault>(std::get<0>(one.param)))) + "_in_" +
              Name(std::get<1>(one.param));
