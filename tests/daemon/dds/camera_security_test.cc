@@ -96,10 +96,10 @@ std::pair<Packet, bool> AsIfLater(Packet packet) {
 
 class CameraSecurity : public test::SecuredDomain {
  protected:
-  [[nodiscard]] std::unique_ptr<CameraDds> Port() const {
-    return std::make_unique<CameraDds>(CameraDds::Options{
-        .dds = {.domain = OwnDomain(), .config_xml = {}, .security = Keys("daemon")},
-        .sensor = {1000, 1000}});
+  [[nodiscard]] std::unique_ptr<CameraDds> Port(const std::string& role = "daemon") const {
+    return std::make_unique<CameraDds>(
+        CameraDds::Options{.dds = {.domain = OwnDomain(), .config_xml = {}, .security = Keys(role)},
+                           .sensor = {1000, 1000}});
   }
   /// A camera that answers so many requests, and keeps its packets in the file `packets`.
   [[nodiscard]] ClientProcess Camera(const std::vector<std::string>& answers) const {
@@ -168,6 +168,14 @@ TEST_F(CameraSecurity, RenewedCredentialsOutliveTheOldAndNoExposureIsLost) {
       std::chrono::nanoseconds(end.ns + 3'000'000'000 - WallTime::Now().ns));
   for (std::uint64_t id = 5; id <= 7; ++id)
     EXPECT_EQ(Ask(port.get(), id), "good-" + std::to_string(id)) << "after the old end";
+}
+
+TEST_F(CameraSecurity, TheCoordinatorOfAPlaneHasACamera) {
+  MakeKeys("--sectors 2");
+  const auto port = Port("coordinator");
+  const ClientProcess camera = Camera({"good"});
+  ASSERT_EQ(camera.Line(), "ready");
+  EXPECT_EQ(Ask(port.get(), 1), "good-1");
 }
 
 TEST_F(CameraSecurity, RecordedPacketsSentAgainAreNoExposure) {
