@@ -212,7 +212,7 @@ void ReportClusters(const Fit& fit, std::vector<std::size_t> far, const Diagnose
 // same, in campaigns of three generators (docs/diagnosis.md). Half or double of them moves the mean
 // distance of stated and right by less than 0.03. Geometry has no rivals, and was never wrong.
 double DoubtOf(const CauseFound& cause, bool beside_unknown) {
-  constexpr double kElse = 0.03, kBesideUnknown = 0.45;
+  constexpr double kElse = 0.03, kBesideUnknown = 0.3;
   if (TraitsOf(cause.cause).is_static) return 0;
   return beside_unknown ? kBesideUnknown : kElse;
 }
