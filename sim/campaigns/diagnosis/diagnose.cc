@@ -23,6 +23,7 @@
 #include "sim/campaigns/diagnosis/outliers.h"
 #include "sim/campaigns/diagnosis/patch.h"
 #include "sim/campaigns/diagnosis/plain_geometry.h"
+#include "sim/campaigns/diagnosis/polished.h"
 #include "sim/campaigns/diagnosis/remarks.h"
 #include "sim/campaigns/diagnosis/rotor_phases.h"
 #include "sim/campaigns/diagnosis/rotors.h"
@@ -375,6 +376,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   const RotorCauses rotors = SettleRotors(templates, rule, options.leave_out, &fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
+  ReassessWithoutMisfitArtefacts(templates, rule, fit, &diagnosis.causes);
   JudgeRotors(fit.model, options.leave_out, rotors, &diagnosis.causes);
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
