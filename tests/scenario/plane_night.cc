@@ -57,6 +57,8 @@ class Night {
 
   PlaneNightResult Run() {
     result_.seed = options_.seed;
+    // A coordinator claims the plane before it takes a configuration.
+    armed_ = options_.fault && options_.phase == PlanePhase::kClaiming;
     if (!plane_.RunUntil([this] { return plane_.IsIdle(); }, Seconds(30)))
       Broken("no coordinator takes charge");
     const auto first = plane_.DrawTargets(2 * options_.seed);

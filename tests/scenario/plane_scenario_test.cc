@@ -163,7 +163,8 @@ class PlaneFaultInPhase : public ::testing::TestWithParam<std::tuple<int, PlaneP
   static double AfterSeconds(PlanePhase phase, std::uint64_t seed) {
     if (phase == PlanePhase::kMoving) return 0.6 * static_cast<double>(seed * seed);
     // A record is durable after 5 ms.
-    return phase == PlanePhase::kRecording ? 0.001 : 0.02;
+    const bool is_record = phase == PlanePhase::kRecording || phase == PlanePhase::kClaiming;
+    return is_record ? 0.001 : 0.02;
   }
   static std::map<std::pair<int, PlanePhase>, Fates> fates_;
 };
@@ -192,10 +193,10 @@ TEST_P(PlaneFaultInPhase, KeepsEveryRule) {
 INSTANTIATE_TEST_SUITE_P(
     All, PlaneFaultInPhase,
     ::testing::Combine(::testing::Range(0, static_cast<int>(kPlaneFaultCount)),
-                       ::testing::Values(PlanePhase::kRecording, PlanePhase::kGathering,
-                                         PlanePhase::kPlanning, PlanePhase::kPreparing,
-                                         PlanePhase::kMoving, PlanePhase::kFinishing,
-                                         PlanePhase::kMeasuring)),
+                       ::testing::Values(PlanePhase::kClaiming, PlanePhase::kRecording,
+                                         PlanePhase::kGathering, PlanePhase::kPlanning,
+                                         PlanePhase::kPreparing, PlanePhase::kMoving,
+                                         PlanePhase::kFinishing, PlanePhase::kMeasuring)),
     [](const auto& one) {
       return std::string(test::Name(static_cast<PlaneFault>(std::get<0>(one.param)))) + "_in_" +
              Name(std::get<1>(one.param));
