@@ -211,7 +211,7 @@ std::vector<std::string> NoNumbersIn(const std::string& text) {
   return found;
 }
 
-// Each cause shares a probability of 1 out among its candidates, and nothing else.
+// Each cause shares a probability out among its candidates, and nothing else.
 void ExpectPosteriors(const nlohmann::json& causes) {
   for (const nlohmann::json& cause : causes) {
     double sum = 0;
@@ -223,7 +223,9 @@ void ExpectPosteriors(const nlohmann::json& causes) {
       EXPECT_GE(probability, 0) << cause;
       sum += probability;
     }
-    EXPECT_NEAR(sum, 1, 1e-9) << cause;
+    // The rest is the doubt that none of them is right.
+    EXPECT_GE(sum, 0.7 - 1e-9) << cause;
+    EXPECT_LE(sum, 1 + 1e-9) << cause;
     EXPECT_TRUE(cause["at_bound"].is_boolean()) << cause;
   }
 }
