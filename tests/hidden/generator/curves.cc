@@ -2,62 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <utility>
 
 #include "protocol/base/rng.h"
+#include "tests/hidden/generator/along_track.h"
 
 namespace focalfleet::hidden {
 
 namespace {
 
-double TravelOf(const Row& row, std::size_t axis) { return row.cmd_deg[axis] - row.from_deg[axis]; }
-
 double DirectionOf(const Row& row, std::size_t axis) { return TravelOf(row, axis) > 0 ? 1 : -1; }
 
-// Adds `made_deg(row, move)` whenever the axis moves; it stays until the axis moves again.
-template <class Made>
-void AddHeld(const Scene& scene, const Effect& effect, std::size_t unit, const Made& made_deg,
-             Track* track) {
-  double held_deg = 0;
-  for (std::size_t m = 0; m < scene.campaign->move_count(); ++m) {
-    const Row& row = scene.campaign->At(m, unit);
-    if (row.Moved(effect.axis))
-      held_deg = made_deg(row, m);
-    else if (row.rehomed)
-      held_deg = 0;
-    track->angle_deg[effect.axis][m] += held_deg;
-  }
-}
-
-// Adds `made_deg(row, move)` whenever the axis moves; the sum stays until the unit is homed.
-template <class Made>
-void AddSum(const Scene& scene, const Effect& effect, std::size_t unit, const Made& made_deg,
-            Track* track) {
-  double sum_deg = 0;
-  AddHeld(
-      scene, effect, unit,
-      [&](const Row& row, std::size_t m) {
-        if (row.rehomed) sum_deg = 0;
-        return sum_deg += made_deg(row, m);
-      },
-      track);
-}
-
-// Adds `error_deg(angle in rad)` in every move.
-template <class Error>
-void AddOfAngle(const Effect& effect, const Error& error_deg, Track* track) {
-  for (double& angle : track->angle_deg[effect.axis]) angle += error_deg(angle * kDegree);
-}
-
-double DriveOf(const Campaign& campaign, std::size_t move, std::size_t unit) {
-  return campaign.At(move, unit).v_bus_V / campaign.v_nominal_V *
-         campaign.exposures[move].drive_amplitude;
-}
-
-// Radians of the rotor as degrees of the arm.
-double OfRotor_deg(const Campaign& campaign, const Effect& effect, std::size_t unit) {
-  return 1 / kDegree / campaign.units[unit].gear[effect.axis];
+// A wave with a share of its second harmonic, as parts that are not ideal have it.
+double Wave(double at_rad, double second, double second_at_rad) {
+  return std::sin(at_rad) + second * std::sin(2 * at_rad + second_at_rad);
 }
 
 // ---- Travel.
@@ -65,7 +23,7 @@ double OfRotor_deg(const Campaign& campaign, const Effect& effect, std::size_t u
 // Most of the extra way is made in the first part of a ramp.
 void RampTravel(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double ramp_deg = 0.1 + 0.5 * effect.shape[0];
-  AddSum(
+  AddTravel(
       scene, effect, unit,
       [&](const Row& row, std::size_t) {
         return effect.Amount(unit) * std::tanh(TravelOf(row, effect.axis) / ramp_deg);
@@ -88,7 +46,7 @@ void StepLoss(const Scene& scene, const Effect& effect, std::size_t unit, Track*
   const double rate = std::abs(effect.Amount(unit));
   const double turn_deg = 360 / scene.campaign->units[unit].gear[effect.axis];
   Rng rng = Rng::Stream(effect.seed, "turns", unit);
-  AddSum(
+  AddTravel(
       scene, effect, unit,
       [&](const Row& row, std::size_t) {
         const double travel = TravelOf(row, effect.axis);
@@ -103,24 +61,25 @@ void StepLoss(const Scene& scene, const Effect& effect, std::size_t unit, Track*
 // The field is a linear spring, and grease in the cold loads it more.
 void LoadAngleLag(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
-  const double lag_deg = std::abs(effect.Amount(unit)) * OfRotor_deg(campaign, effect, unit);
-  AddHeld(
+  AddAtRest(
       scene, effect, unit,
-      [&](const Row& row, std::size_t m) {
+      [&](std::size_t m, double) {
+        const Row& row = campaign.At(m, unit);
         const double cold = 1 - 0.004 * (row.temp_C - campaign.temp_mean_C);
-        return -DirectionOf(row, effect.axis) * lag_deg * cold / DriveOf(campaign, m, unit);
+        return -DirectionOf(row, effect.axis) * std::abs(effect.Amount(unit)) * cold /
+               DriveOf(campaign, m, unit);
       },
       track);
 }
 
 void SupplyDrift(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
-  const double lag_deg = std::abs(effect.Amount(unit)) * OfRotor_deg(campaign, effect, unit);
-  AddHeld(
+  AddAtRest(
       scene, effect, unit,
-      [&](const Row& row, std::size_t) {
+      [&](std::size_t m, double) {
+        const Row& row = campaign.At(m, unit);
         const double low = (campaign.v_mean_V - row.v_bus_V) / campaign.v_mean_V;
-        return -DirectionOf(row, effect.axis) * lag_deg * low * (1 + low);
+        return -DirectionOf(row, effect.axis) * std::abs(effect.Amount(unit)) * low * (1 + low);
       },
       track);
 }
@@ -132,15 +91,15 @@ void SupplyDroop(const Scene& scene, const Effect& effect, std::size_t unit, Tra
   double on_rail = 0;
   for (const Unit& other : campaign.units) on_rail += other.rail == self.rail ? 1 : 0;
   const double along = 1 + (0.2 + effect.shape[0]) * self.rail_slot / std::max(1.0, on_rail);
+  const double drop_rad = std::abs(effect.Amount(unit)) * on_rail * along;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     Effect of_axis = effect;
     of_axis.axis = axis;
-    const double drop_deg = std::abs(effect.Amount(unit)) * OfRotor_deg(campaign, of_axis, unit);
-    AddHeld(
+    AddAtRest(
         scene, of_axis, unit,
-        [&](const Row& row, std::size_t) {
-          return -DirectionOf(row, axis) * drop_deg * on_rail *
-                 std::pow(row.movers_on_rail / on_rail, 1.15) * along;
+        [&](std::size_t m, double) {
+          const Row& row = campaign.At(m, unit);
+          return -DirectionOf(row, axis) * drop_rad * std::pow(row.movers_on_rail / on_rail, 1.15);
         },
         track);
   }
@@ -148,36 +107,25 @@ void SupplyDroop(const Scene& scene, const Effect& effect, std::size_t unit, Tra
 
 // A detent is no pure sine: its flanks differ. A field twice as strong halves it.
 void Cogging(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
-  const Campaign& campaign = *scene.campaign;
   const double order = effect.shape[0] < 0.2 ? 1 : effect.shape[0] < 0.6 ? 2 : 6;
-  const double size_deg = effect.Amount(unit) * OfRotor_deg(campaign, effect, unit);
-  const std::vector<double> at_deg = track->angle_deg[effect.axis];
-  const double gear = campaign.units[unit].gear[effect.axis];
-  AddHeld(
+  AddAtRest(
       scene, effect, unit,
-      [&](const Row&, std::size_t m) {
-        const double wave =
-            order * std::remainder(at_deg[m] * gear, 360.0) * kDegree + effect.phase_rad[unit];
-        return size_deg / DriveOf(campaign, m, unit) *
-               (std::sin(wave) + 0.15 * std::sin(2 * wave + 1));
+      [&](std::size_t m, double rotor_rad) {
+        return effect.Amount(unit) / DriveOf(*scene.campaign, m, unit) *
+               Wave(order * rotor_rad + effect.phase_rad[unit], 0.15, 1);
       },
       track);
 }
 
 // Gain and offset of a phase at once: the first and the second harmonic of the field's angle.
 void PhaseImbalance(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
-  const Campaign& campaign = *scene.campaign;
-  const double size_deg = effect.Amount(unit) * OfRotor_deg(campaign, effect, unit);
-  const double of_gain = effect.shape[0];
-  const std::vector<double> at_deg = track->angle_deg[effect.axis];
-  const double gear = campaign.units[unit].gear[effect.axis];
-  AddHeld(
+  const double of_gain = effect.shape[0], turn = effect.phase_rad[unit];
+  AddAtRest(
       scene, effect, unit,
-      [&](const Row&, std::size_t m) {
-        const double rotor = std::remainder(at_deg[m] * gear, 360.0) * kDegree;
-        const double turn = effect.phase_rad[unit];
-        return size_deg * (of_gain * std::sin(2 * rotor + turn) +
-                           (1 - of_gain) * std::sin(rotor + 2 * turn) / DriveOf(campaign, m, unit));
+      [&](std::size_t m, double rotor_rad) {
+        return effect.Amount(unit) *
+               (of_gain * std::sin(2 * rotor_rad + turn) +
+                (1 - of_gain) * std::sin(rotor_rad + 2 * turn) / DriveOf(*scene.campaign, m, unit));
       },
       track);
 }
@@ -196,18 +144,7 @@ void ModeThreshold(const Scene& scene, const Effect& effect, std::size_t unit, T
       track);
 }
 
-// ---- Gears, as measured: the wave of each part with a share of its second harmonic.
-
-double Wave(double at_rad, double second, double second_at_rad) {
-  return std::sin(at_rad) + second * std::sin(2 * at_rad + second_at_rad);
-}
-
-constexpr double kSpur = 45.0 / 17;
-constexpr double kStage = 60.0 / 14;
-
-bool HasSpur(const Scene& scene, std::size_t unit, std::size_t axis) {
-  return scene.campaign->units[unit].gear[axis] > 500;
-}
+// ---- Gears, as measured.
 
 void AddWave(const Effect& effect, std::size_t unit, double order, double size_deg, Track* track) {
   AddOfAngle(

@@ -2,23 +2,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/hidden/generator/effect.h"
+#include "tests/hidden/generator/along_track.h"
 
 namespace focalfleet::hidden {
 
 namespace {
-
-constexpr double kSpur = 45.0 / 17;
-constexpr double kStage = 60.0 / 14;  // each of the four planetary stages
-
-bool HasSpur(const Scene& scene, std::size_t unit, std::size_t axis) {
-  return scene.campaign->units[unit].gear[axis] > 500;
-}
-
-template <class Error>
-void AddError(const Effect& effect, const Error& error_deg, Track* track) {
-  for (double& angle : track->angle_deg[effect.axis]) angle += error_deg(angle * kDegree);
-}
 
 // A gear turns about a point beside its centre. Seen from there its rim runs by the sine rule, so
 // that the angle is an arcsine of a sine, not a sine. `ratio`: turns of this gear per turn of the
@@ -30,14 +18,14 @@ double OffCentre(double offset_share, double ratio, double output_rad, double ph
 
 void Eccentricity(const Scene&, const Effect& effect, std::size_t unit, Track* track) {
   const double share = effect.Amount(unit);
-  AddError(
+  AddOfAngle(
       effect, [&](double at) { return OffCentre(share, 1, at, effect.phase_rad[unit]); }, track);
 }
 
 void PinionRunout(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double share = effect.Amount(unit);
   const double ratio = HasSpur(scene, unit, effect.axis) ? kSpur : kStage;
-  AddError(
+  AddOfAngle(
       effect, [&](double at) { return OffCentre(share, ratio, at, effect.phase_rad[unit]); },
       track);
 }
@@ -47,7 +35,7 @@ void StageRipple(const Scene& scene, const Effect& effect, std::size_t unit, Tra
   const double base = HasSpur(scene, unit, effect.axis) ? kSpur : 1;
   const double stages = 1 + std::floor(2.999 * effect.shape[0]);  // 1, 2 or 3 stages up
   const double ratio = base * std::pow(kStage, stages);
-  AddError(
+  AddOfAngle(
       effect,
       // Sizes at the arm are alike from stage to stage, so that a stage's own runout grows with the
       // ratio.
@@ -63,7 +51,7 @@ void ToothMesh(const Scene& scene, const Effect& effect, std::size_t unit, Track
   const double depth_deg = effect.Amount(unit);
   const double order = HasSpur(scene, unit, effect.axis) ? 45 : 46;
   const double modulation = 0.3 * effect.shape[0];
-  AddError(
+  AddOfAngle(
       effect,
       [&](double at) {
         const double wave = order * at + effect.phase_rad[unit];
@@ -78,7 +66,7 @@ void ToothDamage(const Scene& scene, const Effect& effect, std::size_t unit, Tra
   const double height_deg = effect.Amount(unit);
   const double ratio = HasSpur(scene, unit, effect.axis) ? kSpur : 1;
   const double width_rad = (10 + 14 * effect.shape[0]) * kDegree;
-  AddError(
+  AddOfAngle(
       effect,
       [&](double at) {
         const double off = ratio * at - effect.phase_rad[unit];
@@ -95,7 +83,7 @@ void HardStop(const Scene& scene, const Effect& effect, std::size_t unit, Track*
   const std::size_t a = effect.axis;
   const bool upper = effect.shape[1] < 0.5;
   const double contact_deg = upper ? self.max_deg[a] - before_deg : self.min_deg[a] + before_deg;
-  AddError(
+  AddOfAngle(
       effect,
       [&](double at) {
         const double into = upper ? at / kDegree - contact_deg : contact_deg - at / kDegree;

@@ -4,39 +4,13 @@
 #include <cmath>
 #include <map>
 
-#include "tests/hidden/generator/effect.h"
+#include "tests/hidden/generator/along_track.h"
 
 namespace focalfleet::hidden {
 
 namespace {
 
-// Calls `lag_deg(move, drive, rotor_rad)` when the axis moved. The rotor stays there until it moves
-// again, because its magnets hold it.
-template <class Lag>
-void AddAtRest(const Scene& scene, const Effect& effect, std::size_t unit, const Lag& lag_rad,
-               Track* track) {
-  const Campaign& campaign = *scene.campaign;
-  const double gear = campaign.units[unit].gear[effect.axis];
-  std::vector<double>& angle = track->angle_deg[effect.axis];
-  double held_deg = 0;
-  for (std::size_t m = 0; m < campaign.move_count(); ++m) {
-    const Row& row = campaign.At(m, unit);
-    if (row.Moved(effect.axis)) {
-      const double rotor_rad = std::remainder(angle[m] * gear, 360.0) * kDegree;
-      held_deg = lag_rad(m, rotor_rad) / kDegree / gear;
-    } else if (row.rehomed) {
-      held_deg = 0;
-    }
-    angle[m] += held_deg;
-  }
-}
-
 double LagAt(double load, double drive) { return std::asin(std::min(0.985, load / drive)); }
-
-double DriveOf(const Campaign& campaign, std::size_t move, std::size_t unit) {
-  return campaign.At(move, unit).v_bus_V / campaign.v_nominal_V *
-         campaign.exposures[move].drive_amplitude;
-}
 
 void LoadAngleLag(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const auto direction = Directions(*scene.campaign, unit, effect.axis);

@@ -4,26 +4,11 @@
 #include <cmath>
 
 #include "protocol/base/rng.h"
-#include "tests/hidden/generator/effect.h"
+#include "tests/hidden/generator/along_track.h"
 
 namespace focalfleet::hidden {
 
 namespace {
-
-// Adds `extra_deg(row, move)` to each move's travel; the sum stays until the unit is homed.
-template <class Extra>
-void AddTravel(const Scene& scene, const Effect& effect, std::size_t unit, const Extra& extra_deg,
-               Track* track) {
-  double sum_deg = 0;
-  for (std::size_t m = 0; m < scene.campaign->move_count(); ++m) {
-    const Row& row = scene.campaign->At(m, unit);
-    if (row.rehomed) sum_deg = 0;
-    if (row.Moved(effect.axis)) sum_deg += extra_deg(row, m);
-    track->angle_deg[effect.axis][m] += sum_deg;
-  }
-}
-
-double TravelOf(const Row& row, std::size_t axis) { return row.cmd_deg[axis] - row.from_deg[axis]; }
 
 // The gear has another number of teeth, or a little more travel per revolution, than the model's.
 void GearScale(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
