@@ -250,6 +250,8 @@ TEST(HiddenScore, StatedProbabilitiesAreComparedWithWhatIsRight) {
   EXPECT_EQ(score.reliability[1].right, 1);
   EXPECT_NEAR(score.reliability[9].stated(), 0.9, 1e-12);
   EXPECT_NEAR(Of(score, "calibration_error").value, 0.4, 1e-12);
+  EXPECT_EQ(Of(ScoreCases({CaseOf(key, ReportOf("consistent", {}))}), "calibration_error").trials,
+            0);
   EXPECT_NE(PictureOf(score.reliability).find("<circle cx=\"330.0\" cy=\"170.0\""),
             std::string::npos)
       << "0.9, of which a half is right";

@@ -10,13 +10,6 @@ namespace focalfleet::hidden {
 
 namespace {
 
-bool IsRight(const Case& c, const std::string& cause) {
-  return c.also_true.count(cause) != 0 ||
-         std::any_of(c.effects.begin(), c.effects.end(), [&](const TrueEffect& effect) {
-           return effect.cause == cause || effect.equivalent.count(cause) != 0;
-         });
-}
-
 std::string Tenths(double value) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.1f", value);
@@ -34,20 +27,21 @@ Reliability ReliabilityOf(const std::vector<Case>& cases) {
         const double at = std::clamp(probability * 10, 0.0, 9.0);
         ReliabilityBin& bin = bins[static_cast<std::size_t>(at)];
         ++bin.count;
-        bin.right += IsRight(c, cause) ? 1 : 0;
+        bin.right += c.also_true.count(cause) != 0 || c.IsTrue(cause) ? 1 : 0;
         bin.stated_sum += probability;
       }
     }
   return bins;
 }
 
-double CalibrationError(const Reliability& reliability) {
+std::optional<double> CalibrationError(const Reliability& reliability) {
   double sum = 0, count = 0;
   for (const ReliabilityBin& bin : reliability) {
     sum += bin.count * std::abs(bin.stated() - bin.share());
     count += bin.count;
   }
-  return count > 0 ? sum / count : 0;
+  if (count == 0) return std::nullopt;
+  return sum / count;
 }
 
 std::string TableOf(const Reliability& reliability) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,9 @@ using Reliability = std::array<ReliabilityBin, 10>;
 
 Reliability ReliabilityOf(const std::vector<Case>& cases);
 
-/// The mean distance of what is stated from what is right, weighted by counts.
-double CalibrationError(const Reliability& reliability);
+/// The mean distance of what is stated from what is right, weighted by counts; nullopt where
+/// nothing was stated.
+std::optional<double> CalibrationError(const Reliability& reliability);
 
 std::string TableOf(const Reliability& reliability);
 

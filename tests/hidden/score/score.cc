@@ -97,12 +97,6 @@ std::vector<NamedCause> Claims(const Case& c) {
 
 bool Detected(const Case& c) { return c.says_unknown || !Claims(c).empty(); }
 
-bool IsTrue(const Case& c, const std::string& cause) {
-  return std::any_of(c.effects.begin(), c.effects.end(), [&](const TrueEffect& effect) {
-    return effect.cause == cause || effect.equivalent.count(cause) != 0;
-  });
-}
-
 bool Related(const TrueEffect& effect, const std::string& cause) {
   return SameClass(effect.cause, cause) || effect.equivalent.count(cause) != 0 ||
          effect.inseparable.count(cause) != 0;
@@ -110,7 +104,7 @@ bool Related(const TrueEffect& effect, const std::string& cause) {
 
 bool SurelyWrong(const Case& c, std::string* how) {
   for (const NamedCause& claim : Claims(c))
-    if (claim.Sure() && !IsTrue(c, claim.cause)) {
+    if (claim.Sure() && !c.IsTrue(claim.cause)) {
       if (how != nullptr) *how = claim.cause;
       return true;
     }
@@ -335,7 +329,8 @@ Score ScoreCases(const std::vector<Case>& cases) {
     if (c.kind == "unknown" && c.effects.size() == 1) CountForeign(c, &tally);
   }
   score.reliability = ReliabilityOf(cases);
-  tally.Value("calibration_error", CalibrationError(score.reliability));
+  if (const auto error = CalibrationError(score.reliability))
+    tally.Value("calibration_error", *error);
   score.figures = Figures(tally);
   return score;
 }

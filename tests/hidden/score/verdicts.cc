@@ -118,4 +118,10 @@ Result<Case> ReadCase(const std::string& name, const std::string& key, const std
   return out;
 }
 
+bool Case::IsTrue(const std::string& cause) const {
+  return std::any_of(effects.begin(), effects.end(), [&](const TrueEffect& effect) {
+    return effect.cause == cause || effect.equivalent.count(cause) != 0;
+  });
+}
+
 }  // namespace focalfleet::hidden

@@ -62,6 +62,9 @@ struct Case {
   std::set<std::string> not_testable;
   double before_um = 0;
   double after_um = 0;
+
+  /// Whether the cause was planted, or looks the same as one that was.
+  [[nodiscard]] bool IsTrue(const std::string& cause) const;
 };
 
 bool IsStatic(const std::string& cause);
