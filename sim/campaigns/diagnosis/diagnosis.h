@@ -50,6 +50,10 @@ struct CauseFound {
   std::string paragraph;  // for the operator
 };
 
+/// The probability that none of a cause's candidates is right, as measured on planted campaigns:
+/// 3 %, 30 % beside an unknown, and none for geometry.
+double DoubtOf(std::string_view cause, bool beside_unknown);
+
 /// The probability of each candidate; the rest of 1 is the cause's doubt. Shape: (candidates).
 std::vector<double> PosteriorOf(const CauseFound& cause);
 

@@ -19,7 +19,7 @@ namespace {
 
 // Whether the cause is found by exact places: what it explains is no shape of another.
 bool IsFoundElsewhere(const CauseFound& cause) {
-  return TraitsOf(cause.cause).is_of_events || cause.amplitude_unit == kEvents;
+  return TraitsOf(cause.cause).is_found_exactly || cause.amplitude_unit == kEvents;
 }
 
 bool IsCandidate(const CauseFound& cause, std::string_view name) {
@@ -253,7 +253,6 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
   // In 1200 hidden campaigns the sure names below 15 were right; later one at 14.95 was not.
   constexpr double kFar_deg = 12;
   constexpr double kSecond = 0.3;  // of the stronger cause's evidence
-  const auto bends = [](std::string_view name) { return TraitsOf(name).bends_with_field; };
   if (model.units.empty()) return;
   // Whether exact waves have decided the cause of its axes.
   const auto is_reported_by = [&](const CauseFound& cause, std::string_view name) {
@@ -261,7 +260,7 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
            (cause.axis == "theta" || reported[kPhi] == name);
   };
   for (CauseFound& cause : *causes) {
-    if (!bends(cause.cause) || is_reported_by(cause, cause.cause)) continue;
+    if (!HasRotorWays(cause.cause) || is_reported_by(cause, cause.cause)) continue;
     const double turns = cause.axis == "theta" ? MedianGear(model, kTheta)
                          : cause.axis == "phi"
                              ? MedianGear(model, kPhi)
@@ -274,7 +273,7 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     const auto stronger = std::ranges::find_if(kept, [&](const CauseFound& other) {
-      return cause.cause != other.cause && bends(cause.cause) && bends(other.cause) &&
+      return cause.cause != other.cause && HasRotorWays(cause.cause) && HasRotorWays(other.cause) &&
              AxesMeet(cause.axis, other.axis) &&
              (IsCandidate(cause, other.cause) ||
               (is_reported_by(cause, other.cause) && std::isfinite(ShareBeside(other, cause)))) &&

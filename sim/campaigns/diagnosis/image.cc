@@ -259,7 +259,7 @@ bool MovesAlongALine(const Motion& motion) {
          motion.square[3] <= noise[3] + kLeaks * along;
 }
 
-bool IsImageStep(const ModelTerm& term) { return term.form.effect->cause == kCameraSimilarity; }
+bool IsImageStep(const ModelTerm& term) { return term.form.effect->traits.is_of_camera; }
 
 // Drops steps of the whole image, which were a first guess at its motion. Returns whether there
 // were any.

@@ -178,7 +178,8 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   // Steps of the image are a misfit of its motion where that follows a column.
   if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
                   [](const UnknownFound& reported) { return reported.channel == kImageShift; }))
-    std::erase_if(causes, [](const CauseFound& cause) { return cause.cause == kCameraSimilarity; });
+    std::erase_if(causes,
+                  [](const CauseFound& cause) { return TraitsOf(cause.cause).is_of_camera; });
   JudgeMisfitArtefacts(fit.model.units.size(), &causes);
   std::vector<UnknownFound> nameless;
   JudgeNames(&causes, &nameless);

@@ -102,7 +102,7 @@ double LeastCost(const Rotor& rotor, const RotorWay& way) {
 }
 
 bool IsOfRotor(const ModelTerm& term, std::size_t axis) {
-  return term.form.effect->traits.bends_with_field && AxisIndex(term.form) == axis;
+  return HasRotorWays(term.form.effect->cause) && AxisIndex(term.form) == axis;
 }
 
 // The term of the axis with the largest effect; kNoTerm: it has none.
@@ -256,9 +256,8 @@ RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
     for (std::size_t t = 0; t < fit->model.terms.size(); ++t)
       if (IsOfRotor(fit->model.terms[t], axis) &&
           fit->model.terms[t].form.effect->cause == way.cause)
-        std::erase_if(selection->accepted[t].rivals, [](const Rival& rival) {
-          return std::ranges::count(RotorWayCauses(), rival.cause) != 0;
-        });
+        std::erase_if(selection->accepted[t].rivals,
+                      [](const Rival& rival) { return HasRotorWays(rival.cause); });
   }
   return reported;
 }

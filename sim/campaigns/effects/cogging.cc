@@ -49,7 +49,7 @@ Effect MakeCogging() {
           .apply = ApplyCogging,
           // At one drive level the pull of the poles is a ripple like that of the phases.
           .passes_for = {"phase_imbalance"},
-          .traits = {.families = {Family::kRotor}, .bends_with_field = true}};
+          .traits = {.families = {Family::kRotor}}};
 }
 
 }  // namespace focalfleet::sim

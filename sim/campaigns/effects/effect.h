@@ -116,8 +116,9 @@ struct Effect {
   // factor of five. Shape 0 stands for any that is below all moves.
   bool amplitude_is_shape = false;
   // How much the effect of a real part differs from this shape, as a share of its amplitude (one
-  // sigma). Sizes found in other authors' plants scatter so much about the planted ones; half of it
-  // leaves their intervals as they are without it, twice as much covers one more of 29.
+  // sigma). Sizes found in another author's plant scatter so much about the planted ones. In 54 of
+  // its campaigns intervals of 95 % cover 26 of 29 amplitudes, 24 with half of it or none, 27 with
+  // twice as much.
   double discrepancy = 0.08;
   // Whether the moves can distinguish this shape. nullptr: any moves can.
   bool (*shows)(const Template&, const CampaignFacts&) = nullptr;

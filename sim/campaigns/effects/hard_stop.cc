@@ -50,7 +50,9 @@ Effect MakeHardStop() {
           .apply = ApplyHardStop,
           .of_poses_alone = EachForm,
           .continuous_shape = true,
-          .amplitude_low = 0,  // a stop holds an axis back, and never pulls
+          // A stop holds an axis back and never pulls. At 1 the axis stands still there; more is
+          // for a stop between two of the listed places.
+          .amplitude_low = 0,
           .amplitude_high = 1.5,
           .traits = {.families = {Family::kAngles}}};
 }

@@ -8,13 +8,13 @@ namespace focalfleet::sim {
 
 const Traits& TraitsOf(std::string_view cause) {
   static const std::map<std::string_view, Traits> others = {
-      {kZeroOffset, {.families = {}, .is_static = true, .is_of_events = true}},
-      {kBaseOffset, {.families = {}, .is_static = true, .is_of_events = true}},
-      {kArmLength, {.families = {}, .is_static = true, .is_of_events = true}},
-      {kIdentitySwap, {.families = {}, .is_of_events = true}},
-      {kLostCommand, {.families = {}, .is_of_events = true}},
-      {kStepLoss, {.families = {}, .is_of_events = true}},
-      {kSensorBias, {.families = {}, .is_of_events = true}},
+      {kZeroOffset, {.families = {}, .is_static = true, .is_found_exactly = true}},
+      {kBaseOffset, {.families = {}, .is_static = true, .is_found_exactly = true}},
+      {kArmLength, {.families = {}, .is_static = true, .is_found_exactly = true}},
+      {kIdentitySwap, {.families = {}, .is_found_exactly = true}},
+      {kLostCommand, {.families = {}, .is_found_exactly = true}},
+      {kStepLoss, {.families = {}, .is_found_exactly = true}},
+      {kSensorBias, {.families = {}, .is_found_exactly = true}},
       {kAirTurbulence, {.families = {Family::kImage}, .is_of_air = true}}};
   static const Traits none;
   if (const auto other = others.find(cause); other != others.end()) return other->second;

@@ -57,7 +57,7 @@ Effect MakePhaseImbalance() {
               "know the drive level, the others fall with it.",
           .list = ListPhaseImbalance,
           .apply = ApplyPhaseImbalance,
-          .traits = {.families = {Family::kRotor}, .bends_with_field = true}};
+          .traits = {.families = {Family::kRotor}}};
 }
 
 }  // namespace focalfleet::sim

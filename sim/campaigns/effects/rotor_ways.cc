@@ -43,6 +43,8 @@ std::span<const RotorWay> RotorWays() { return kWays; }
 
 std::span<const std::string_view> RotorWayCauses() { return kCauses; }
 
+bool HasRotorWays(std::string_view cause) { return std::ranges::count(kCauses, cause) != 0; }
+
 double DetentError(double harmonic, double wave_deg, double detent) {
   // The lag nearest to zero: sin(lag) - detent sin(wave - n lag) goes from -sin(wave) to its first
   // zero.

@@ -20,6 +20,7 @@ std::span<const RotorWay> RotorWays();
 
 /// The causes that have such ways, each once.
 std::span<const std::string_view> RotorWayCauses();
+bool HasRotorWays(std::string_view cause);
 
 /// The angle from the commanded one at which a rotor comes to rest: the root nearest zero of
 /// sin(lag) = detent sin(wave - harmonic lag).

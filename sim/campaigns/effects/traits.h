@@ -31,10 +31,9 @@ struct Traits {
   bool by_direction = false;    // turns its sign with the move, by a column
   bool acts_on_others = false;  // between neighbours
   bool is_static = false;       // a constant of the geometry
-  bool is_of_events = false;    // found by exact places: no shape of another cause leaves it
-  bool is_of_air = false;       // moves neighbours alike, anew in each exposure
-  bool is_of_camera = false;    // the camera's own motion, free in each exposure
-  bool bends_with_field = false;  // turns a rotor far out of its field: bends like its like there
+  bool is_found_exactly = false;  // by places or steps: no shape of another cause leaves it
+  bool is_of_air = false;         // moves neighbours alike, anew in each exposure
+  bool is_of_camera = false;      // the camera's own motion, free in each exposure
 
   [[nodiscard]] bool IsOf(Family family) const {
     return std::ranges::find(families, family) != families.end();

@@ -211,9 +211,9 @@ std::vector<std::string> NoNumbersIn(const std::string& text) {
   return found;
 }
 
-// Each cause shares a probability out among its candidates, and nothing else.
-void ExpectPosteriors(const nlohmann::json& causes) {
-  for (const nlohmann::json& cause : causes) {
+// Each cause shares out among its candidates what its doubt leaves of 1, and nothing else.
+void ExpectPosteriors(const nlohmann::json& report) {
+  for (const nlohmann::json& cause : report["causes"]) {
     double sum = 0;
     EXPECT_EQ(cause["posterior"].size(), cause["candidates"].size()) << cause;
     for (const nlohmann::json& candidate : cause["candidates"]) {
@@ -223,9 +223,8 @@ void ExpectPosteriors(const nlohmann::json& causes) {
       EXPECT_GE(probability, 0) << cause;
       sum += probability;
     }
-    // The rest is the doubt that none of them is right.
-    EXPECT_GE(sum, 0.7 - 1e-9) << cause;
-    EXPECT_LE(sum, 1 + 1e-9) << cause;
+    const std::string named = cause["cause"];
+    EXPECT_NEAR(sum, 1 - sim::DoubtOf(named, !report["unknown"].empty()), 1e-9) << cause;
     EXPECT_TRUE(cause["at_bound"].is_boolean()) << cause;
   }
 }
@@ -265,7 +264,7 @@ TEST_P(OddCampaign, IsDiagnosedInNumbers) {
   EXPECT_THAT(NoNumbersIn(WriteNextMoves(campaign.units, diagnosis.next.moves)), IsEmpty());
   const nlohmann::json report = ReportJson(diagnosis, names);
   EXPECT_THAT(NoNumbersIn(report.dump()), IsEmpty());
-  ExpectPosteriors(report["causes"]);
+  ExpectPosteriors(report);
   const std::string by_class = WriteUnitsByClass(diagnosis);
   EXPECT_THAT(NoNumbersIn(by_class), IsEmpty());
   ExpectUnitsByClass(campaign, by_class, report["units_by_class"]);

@@ -1,5 +1,5 @@
-// What the laws of both physics have in common: walks along a unit's track, and the numbers of its
-// drive and gears.
+// Walks along a unit's track, and the numbers of its drive and gears, which the laws of both
+// physics have in common.
 #pragma once
 
 #include <cmath>

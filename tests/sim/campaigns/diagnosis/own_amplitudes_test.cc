@@ -13,7 +13,9 @@ namespace focalfleet::sim {
 namespace {
 
 using test::Planted;
+using test::Reported;
 using test::StaticFit;
+using test::Verdicts;
 
 // The fit with a term of the first template of the cause that acts on this axis.
 Fit WithTerm(const CampaignFacts& facts, std::string_view cause, EffectAxis axis,
@@ -76,6 +78,16 @@ TEST(OwnAmplitudes, ErrorsDoNotLengthenAWaveOfTwoColumns) {
               static_cast<double>(all.size());
   EXPECT_GT(length, 0.023);
   EXPECT_NEAR(Summarise(fit.model.terms[0]).value, 0.02, 0.002);
+}
+
+// Many rows know an amplitude better than anybody knows the shape.
+TEST(OwnAmplitudes, AnIntervalCountsInThatAShapeIsRoughlyRight) {
+  const Diagnosis diagnosis = Verdicts(
+      Planted({{"eccentricity", 0.3, "theta"}}, {.units = 40, .moves = 60, .noise_um = 1}));
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
+  const CauseFound& cause = diagnosis.causes[0];
+  const double half_width = (cause.ci95[1] - cause.ci95[0]) / 2;
+  EXPECT_NEAR(half_width, 1.96 * 0.08 * cause.amplitude, 0.1 * half_width);
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 #include <set>
 #include <string>
 
-#include "sim/campaigns/planting/planted.h"
 #include "sim/campaigns/effects/registry.h"
+#include "sim/campaigns/planting/planted.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -361,6 +361,9 @@ TEST(Effects, AnAmplitudeIsWhatPhysicsAllows) {
   EXPECT_TRUE(CanBe(rounding, 1, 0));
   EXPECT_FALSE(CanBe(rounding, 0.1, 0));
   EXPECT_FALSE(CanBe(rounding, -1, 0.1));
+  const Template stop{.effect = FindEffect("hard_stop"), .axis = EffectAxis::kPhi, .shape = 4};
+  EXPECT_TRUE(CanBe(stop, 1, 0));
+  EXPECT_FALSE(CanBe(stop, -0.005, 0)) << "a stop never pulls";
 }
 
 TEST(Effects, AMissingColumnLeavesNoTemplates) {
