@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/campaigns/diagnosis/fleet_sums.h"
 #include "sim/campaigns/diagnosis/lanes.h"
 #include "sim/campaigns/diagnosis/neighbour_sum.h"
 #include "sim/campaigns/diagnosis/unit_scorer.h"
@@ -17,40 +18,13 @@ using Eigen::VectorXd;
 constexpr double kLeverageMax = 0.5;  // of a signature in one row: an outlier looks the same
 constexpr double kKeptOfSignatureMin = 0.01;  // of a unit's signature beside its geometry
 
-// The part that a chunk of units adds to a template's sums over the fleet.
-struct FleetPart {
-  double raw = 0, kept = 0, spread_sum = 0, spread_count = 0;
-  std::vector<double> exposure_g;  // of several columns. Shape: (exposures, c, c)
-};
-
-struct LookPart {
-  std::vector<FleetPart> of_template;
-  std::vector<Lanes> exposure_b, exposure_g;  // Shape: (blocks, exposures)
-  std::vector<Lanes> shared_cross;            // shared' M. Shape: (blocks, shared columns of all)
-  MatrixXd shared_g;
-  VectorXd shared_b, shared_target_b;
-  double target_square = 0, residual_square = 0;
-  std::size_t values = 0;
-};
-
-using ChunkPart = std::vector<LookPart>;  // Shape: (looks)
-
-// The data that the units of a pass share.
-struct PassPlan {
-  const Fit& fit;
-  const Templates& templates;
-  std::span<const std::size_t> withouts;
-  std::vector<Block> blocks;
-  SharedColumns shared;
-};
-
 // Buffers for one block of one unit.
 struct Scratch {
   std::vector<Lanes> raw, m;          // Shape: (2 moves): before and after the projection
   std::vector<Lanes> gg, by;          // Shape: (moves): products of m with itself and with the data
   std::vector<Lanes> parts;           // along a plane's columns
   std::vector<double> products;       // of several columns with each other. Shape: (moves, c, c)
-  std::vector<std::size_t> exposure;  // Shape: (moves)
+  std::vector<std::size_t> exposure;  // of the chunk's. Shape: (moves)
 };
 
 // Products of a template's columns with each other, move by move. Shape: (moves, c, c).
@@ -88,7 +62,7 @@ double SpreadOf(const std::vector<double>& products, const std::vector<Lanes>& b
 
 // Dispersion of the moves' scores about the unit's own fit, 1 for noise as modelled. Noise with
 // memory makes more of it.
-void AddSpread(double sum, Index values, Index spent, std::size_t columns, FleetPart* part) {
+void AddSpread(double sum, Index values, Index spent, std::size_t columns, TemplateSums* part) {
   const auto n = static_cast<double>(values);
   const double free = n - static_cast<double>(spent) - static_cast<double>(columns);
   if (free < 4 || !std::isfinite(sum)) return;
@@ -114,18 +88,23 @@ void AddAtExposures(const std::vector<Lanes>& of_move, const std::vector<std::si
 // Scores a unit in the lanes of one block after the other.
 class BlockScorer {
  public:
-  BlockScorer(const PassPlan& plan, std::size_t unit, UnitScorer* scorer, Scratch* scratch)
-      : plan_(plan), unit_(unit), scorer_(*scorer), scratch_(*scratch) {
+  BlockScorer(const PassPlan& plan, std::size_t unit, UnitScorer* scorer, Scratch* scratch,
+              FleetSums* part)
+      : plan_(plan), unit_(unit), scorer_(*scorer), scratch_(*scratch), part_(*part) {
     moves_ = scorer_.white().moves.size();
     scratch_.raw.resize(2 * moves_), scratch_.m.resize(2 * moves_);
     scratch_.gg.resize(moves_), scratch_.by.resize(moves_);
     scratch_.exposure.clear();
-    for (const std::size_t move : scorer_.white().moves)
-      scratch_.exposure.push_back(
-          plan.fit.facts->exposures.of_row[scorer_.white().track.first_row + move]);
+    const std::vector<std::size_t>& known = part_.exposures;
+    for (const std::size_t move : scorer_.white().moves) {
+      const std::size_t row = scorer_.white().track.first_row + move;
+      const auto at =
+          std::lower_bound(known.begin(), known.end(), plan.fit.facts->exposures.of_row[row]);
+      scratch_.exposure.push_back(static_cast<std::size_t>(at - known.begin()));
+    }
   }
 
-  void Score(std::size_t block, std::vector<ScorePass>* passes, ChunkPart* part) {
+  void Score(std::size_t block, std::vector<ScorePass>* passes) {
     block_ = block;
     scorer_.MakeSignatures(plan_.templates, plan_.blocks[block], &scratch_.raw);
     whole_ = SquareLanes(scratch_.raw.data(), 2 * moves_);
@@ -134,9 +113,9 @@ class BlockScorer {
       for (std::size_t l = 0; l < scorer_.looks().size(); ++l) {
         const UnitScorer::UnitLook& look = scorer_.looks()[l];
         if (look.plane != p || !look.usable) continue;
-        AddLengths(&(*part)[l]);
-        AddShared(plan_.shared.of_look[l], &(*part)[l]);
-        TakeLook(look, &(*passes)[l], &(*part)[l]);
+        AddLengths(&part_.looks[l]);
+        AddShared(plan_.shared.of_look[l], &part_.looks[l]);
+        TakeLook(look, &(*passes)[l], &part_.looks[l]);
       }
     }
   }
@@ -198,10 +177,10 @@ class BlockScorer {
         for (std::size_t j = 0; j < kLanes; ++j) row.at[j] = mask.at[j] > 0 ? row.at[j] : 0;
   }
 
-  void AddLengths(LookPart* part) const {
+  void AddLengths(LookSums* part) const {
     for (std::size_t i = 0; i < says_.size(); ++i) {
       const Placed& placed = plan_.blocks[block_].forms[i];
-      FleetPart& fleet = part->of_template[placed.form];
+      TemplateSums& fleet = part->of_template[placed.form];
       for (std::size_t c = 0; c < plan_.templates[placed.form].columns; ++c) {
         fleet.raw += raw_.at[placed.lane + c];
         if (says_[i]) fleet.kept += kept_.at[placed.lane + c];
@@ -209,14 +188,14 @@ class BlockScorer {
     }
   }
 
-  void AddShared(const std::vector<Index>& columns, LookPart* part) const {
+  void AddShared(const std::vector<Index>& columns, LookSums* part) const {
     Lanes* sums = part->shared_cross.data() + block_ * columns.size();
     for (const Index column : columns)
       AddLanes(shared_cross_[static_cast<std::size_t>(column)], sums++);
   }
 
-  void TakeLook(const UnitScorer::UnitLook& look, ScorePass* pass, LookPart* part) {
-    const std::size_t exposures = plan_.fit.facts->exposures.size();
+  void TakeLook(const UnitScorer::UnitLook& look, ScorePass* pass, LookSums* part) {
+    const std::size_t exposures = part_.exposures.size();
     const Lanes b = MultiplyByData(scratch_.m.data(), look.y, scratch_.by.data());
     AddAtExposures(scratch_.by, scratch_.exposure, &part->exposure_b[block_ * exposures]);
     Lanes target_b;
@@ -242,7 +221,7 @@ class BlockScorer {
     }
   }
 
-  void TakeSingles(const UnitScorer::UnitLook& look, const Lanes& b, LookPart* part) {
+  void TakeSingles(const UnitScorer::UnitLook& look, const Lanes& b, LookSums* part) {
     Lanes own;
     const std::vector<Placed>& forms = plan_.blocks[block_].forms;
     for (std::size_t i = 0; i < forms.size(); ++i)
@@ -255,7 +234,7 @@ class BlockScorer {
   }
 
   void TakeSeveral(const Placed& placed, const UnitScorer::UnitLook& look, sim::Score* score,
-                   FleetPart* fleet) {
+                   TemplateSums* fleet) {
     const std::size_t c = plan_.templates[placed.form].columns;
     const auto ic = static_cast<Index>(c);
     std::vector<double>& products = scratch_.products;
@@ -275,6 +254,7 @@ class BlockScorer {
   std::size_t unit_;
   UnitScorer& scorer_;
   Scratch& scratch_;
+  FleetSums& part_;
   std::size_t moves_ = 0;
   // The present block and plane.
   std::size_t block_ = 0;
@@ -284,11 +264,11 @@ class BlockScorer {
   std::vector<Lanes> shared_cross_;
 };
 
-void AddUnit(const UnitScorer& scorer, const SharedColumns& shared, ChunkPart* part) {
+void AddUnit(const UnitScorer& scorer, const SharedColumns& shared, FleetSums* part) {
   for (std::size_t l = 0; l < scorer.looks().size(); ++l) {
     const UnitScorer::UnitLook& look = scorer.looks()[l];
     if (!look.usable) continue;
-    LookPart& sums = (*part)[l];
+    LookSums& sums = part->looks[l];
     sums.residual_square += look.y.squaredNorm();
     sums.target_square += look.target.squaredNorm();
     sums.values += static_cast<std::size_t>(look.y.size());
@@ -300,60 +280,13 @@ void AddUnit(const UnitScorer& scorer, const SharedColumns& shared, ChunkPart* p
 }
 
 void ScoreUnit(const PassPlan& plan, std::size_t unit, Scratch* scratch,
-               std::vector<ScorePass>* passes, ChunkPart* part) {
+               std::vector<ScorePass>* passes, FleetSums* part) {
   if (!plan.fit.UsesUnit(unit)) return;
   UnitScorer scorer(plan.fit, unit, plan.withouts, plan.shared);
   if (!scorer.usable()) return;
   AddUnit(scorer, plan.shared, part);
-  BlockScorer blocks(plan, unit, &scorer, scratch);
-  for (std::size_t block = 0; block < plan.blocks.size(); ++block)
-    blocks.Score(block, passes, part);
-}
-
-ChunkPart EmptyPart(const PassPlan& plan) {
-  const std::size_t exposures = plan.fit.facts->exposures.size();
-  ChunkPart part(plan.withouts.size());
-  for (std::size_t l = 0; l < part.size(); ++l) {
-    LookPart& look = part[l];
-    const auto shared = static_cast<Index>(plan.shared.of_look[l].size());
-    look.of_template.resize(plan.templates.size());
-    for (std::size_t k = 0; k < plan.templates.size(); ++k)
-      if (const std::size_t c = plan.templates[k].columns; c > 1)
-        look.of_template[k].exposure_g.assign(exposures * c * c, 0);
-    look.exposure_b.resize(plan.blocks.size() * exposures);
-    look.exposure_g.resize(plan.blocks.size() * exposures);
-    look.shared_cross.resize(plan.blocks.size() * plan.shared.of_look[l].size());
-    look.shared_g = MatrixXd::Zero(shared, shared);
-    look.shared_b = VectorXd::Zero(shared);
-    look.shared_target_b = VectorXd::Zero(shared);
-  }
-  return part;
-}
-
-void AddTo(const std::vector<double>& from, std::vector<double>* to) {
-  for (std::size_t i = 0; i < from.size(); ++i) (*to)[i] += from[i];
-}
-void AddTo(const std::vector<Lanes>& from, std::vector<Lanes>* to) {
-  for (std::size_t i = 0; i < from.size(); ++i) AddLanes(from[i], to->data() + i);
-}
-
-void Merge(const LookPart& from, LookPart* to) {
-  for (std::size_t k = 0; k < from.of_template.size(); ++k) {
-    const FleetPart& a = from.of_template[k];
-    FleetPart& b = to->of_template[k];
-    AddTo(a.exposure_g, &b.exposure_g);
-    b.raw += a.raw, b.kept += a.kept;
-    b.spread_sum += a.spread_sum, b.spread_count += a.spread_count;
-  }
-  AddTo(from.exposure_b, &to->exposure_b);
-  AddTo(from.exposure_g, &to->exposure_g);
-  AddTo(from.shared_cross, &to->shared_cross);
-  to->shared_g += from.shared_g;
-  to->shared_b += from.shared_b;
-  to->shared_target_b += from.shared_target_b;
-  to->target_square += from.target_square;
-  to->residual_square += from.residual_square;
-  to->values += from.values;
+  BlockScorer blocks(plan, unit, &scorer, scratch, part);
+  for (std::size_t block = 0; block < plan.blocks.size(); ++block) blocks.Score(block, passes);
 }
 
 // The lanes of one template, as numbers one after the other.
@@ -378,14 +311,14 @@ void SumUnits(Index c, Score* score) {
   }
 }
 
-void TakeFleet(const PassPlan& plan, const LookPart& all, ScorePass* pass) {
+void TakeFleet(const PassPlan& plan, const LookSums& all, ScorePass* pass) {
   const std::size_t exposures = plan.fit.facts->exposures.size();
   const Index shared = all.shared_g.rows();
   const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(
       shared > 0 ? all.shared_g : MatrixXd::Identity(1, 1));
   const auto take = [&](std::size_t block, const Placed& placed) {
     Score& score = pass->scores[placed.form];
-    const FleetPart& part = all.of_template[placed.form];
+    const TemplateSums& part = all.of_template[placed.form];
     const std::size_t columns = plan.templates[placed.form].columns;
     const auto c = static_cast<Index>(columns);
     score.exposure_b = OutOfLanes(&all.exposure_b[block * exposures], exposures, placed, columns);
@@ -449,23 +382,22 @@ std::vector<ScorePass> ScoreWithouts(const Fit& fit, const Templates& templates,
   const PassPlan plan{fit, templates, withouts, PlaceInLanes(templates),
                       ListShared(fit.model.terms, withouts)};
   std::vector<ScorePass> passes(withouts.size(), EmptyPass(templates, units));
-  ChunkPart all = EmptyPart(plan);
+  FleetSums all = EmptySums(plan, {0, units});
   // Chunks run a few at a time, because the part of each is as large as a pass.
   constexpr std::size_t kAtOnce = 8;
   const std::vector<UnitChunk> chunks = ChunksOf(units);
   for (std::size_t begin = 0; begin < chunks.size(); begin += kAtOnce) {
-    std::vector<ChunkPart> parts(std::min(kAtOnce, chunks.size() - begin));
+    std::vector<FleetSums> parts(std::min(kAtOnce, chunks.size() - begin));
     fit.parallel(parts.size(), [&](std::size_t k) {
-      parts[k] = EmptyPart(plan);
-      Scratch scratch;
       const UnitChunk& chunk = chunks[begin + k];
+      parts[k] = EmptySums(plan, chunk);
+      Scratch scratch;
       for (std::size_t unit = chunk.begin; unit < chunk.end; ++unit)
         ScoreUnit(plan, unit, &scratch, &passes, &parts[k]);
     });
-    for (const ChunkPart& part : parts)
-      for (std::size_t l = 0; l < part.size(); ++l) Merge(part[l], &all[l]);
+    for (const FleetSums& part : parts) AddSums(plan, part, &all);
   }
-  for (std::size_t l = 0; l < all.size(); ++l) TakeFleet(plan, all[l], &passes[l]);
+  for (std::size_t l = 0; l < passes.size(); ++l) TakeFleet(plan, all.looks[l], &passes[l]);
   return passes;
 }
 
