@@ -42,6 +42,12 @@ constexpr bool IsCertain(MeasurementStatus status) {
          status == MeasurementStatus::kSwapped;
 }
 
+/// The status says how far the unit is from where it was sent. A swapped unit's place is certain,
+/// too, but not the way by which another's commands led there.
+constexpr bool IsPut(MeasurementStatus status) {
+  return IsCertain(status) && status != MeasurementStatus::kSwapped;
+}
+
 /// A symmetric matrix. Units: mm^2. Frame: focal plane.
 struct CovarianceFp {
   double xx = 0;

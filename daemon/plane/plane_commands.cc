@@ -44,8 +44,8 @@ Status CheckKnown(const PlaneInstant& plane, const Standing& standing, Positione
   return Fail(ErrorCode::kRefused,
               "unit " + std::to_string(plane.plane->layout().unit(i).id.value) + " is of " +
                   NameOfSector(plane.plane->SectorOf(i)) +
-                  ", which has not been heard since this coordinator started: its units' drives "
-                  "are not known");
+                  ", which has not said since this coordinator started where its units stand: try "
+                  "again when the sector is idle (focalfleet status)");
 }
 
 Status CheckCamera(const PlaneInstant& plane) {
@@ -123,7 +123,7 @@ Result<PlaneHomeCommand> PlaneHomeOf(const PlaneInstant& plane, const Json& args
 }
 
 /// Why the unit cannot go anywhere now; empty: it can, as far as it alone is concerned.
-std::string WhyNotNow(const PlaneInstant& plane, PositionerIndex i) {
+std::string WhyNotNow(const PlaneInstant& plane, const Standing& standing, PositionerIndex i) {
   const std::uint32_t sector = plane.plane->SectorOf(i);
   const SectorBook& book = plane.coordinator->sectors();
   if (!book.IsUsable(sector)) return NameOfSector(sector) + " " + book[sector].trouble;
@@ -133,8 +133,7 @@ std::string WhyNotNow(const PlaneInstant& plane, PositionerIndex i) {
   if (unit == nullptr || plane.table->IsSilent(sector, plane.steady)) return "it is not heard";
   if (!unit->enabled) return "disabled";
   if (unit->phase != UnitPhase::kReady) return std::string("it is ") + Name(unit->phase);
-  if (!IsPlace(book[sector].places->places[plane.plane->Local(i).value]))
-    return "its place is not known";
+  if (!IsPlace(standing.places[i.value])) return "its place is not known";
   return {};
 }
 
@@ -166,7 +165,7 @@ Result<PlanePreview> PlanePreviewOf(const PlaneInstant& plane, const Json& args)
   job.options.fixed = command.fixed;
   job.offsets.resize(standing.places.size());
   for (std::uint32_t n = 0; n < standing.places.size(); ++n) {
-    std::string why = WhyNotNow(plane, {n});
+    std::string why = WhyNotNow(plane, standing, {n});
     const std::optional<Pose>& target = command.targets[n];
     job.frozen.push_back(why.empty() ? 0 : 1);
     job.targets.push_back(why.empty() ? target : std::nullopt);

@@ -1,7 +1,7 @@
-// The command that a request asks of a plane's coordinator: apply, home, measure,
-// retarget, stop. The
-// arguments are those of a daemon of its own (verbs/requested_command.h). They are checked against
-// places and drives of all units as their sectors last reported them, before anything happens.
+// The command that a request asks of a plane's coordinator: apply, home, measure, retarget, stop.
+// The arguments are those of a daemon of its own (verbs/requested_command.h). They are checked
+// against places and drives of all units as their sectors last reported them, before anything
+// happens.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@
 
 namespace focalfleet {
 
-/// Whether CommandOf knows the verb.
+/// Whether PlaneCommandOf knows the verb.
 bool IsPlaneCommand(const std::string& verb);
 
 /// Pre: IsPlaneCommand; `plane` has a table. Errors: kInvalid or kRefused, with a text for people;

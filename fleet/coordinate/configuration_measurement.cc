@@ -18,29 +18,22 @@ constexpr int kExposuresRefusedMax = 3;
 // A unit's sensors are read so long after the last motion: a board averages over 26 ms.
 constexpr DurationNs kSensorsSettle = Milliseconds(50);
 
-void Summarise(std::vector<double> errors_um, MeasuredRound* round) {
-  if (errors_um.empty()) return;
-  double sum = 0;
-  for (const double um : errors_um) sum += um * um;
-  round->rms_um = std::sqrt(sum / static_cast<double>(errors_um.size()));
-  std::sort(errors_um.begin(), errors_um.end());
-  round->median_um = errors_um[errors_um.size() / 2];
-  round->worst_um = errors_um.back();
-}
-
-/// A swapped unit's place is certain, too, but not the way by which another's commands led there.
-bool IsPut(const Measurement& measurement) {
-  return (measurement.status == MeasurementStatus::kMeasured ||
-          measurement.status == MeasurementStatus::kDidNotMove) &&
-         measurement.place;
-}
-
 bool IsLocating(const UnitTable& units) {
   return std::ranges::any_of(units.all(),
                              [](const UnitRecord& unit) { return unit.locating.has_value(); });
 }
 
 }  // namespace
+
+void Summarise(std::vector<double> errors_um, MeasuredRound* round) {
+  if (errors_um.empty()) return;
+  double sum = 0;
+  for (const double um : errors_um) sum += um * um;
+  round->rms_um = std::sqrt(sum / static_cast<double>(errors_um.size()));
+  std::ranges::sort(errors_um);
+  round->median_um = errors_um[errors_um.size() / 2];
+  round->worst_um = errors_um.back();
+}
 
 void ConfigurationMeasurement::Begin() {
   measured_batch_ = 0;
@@ -64,6 +57,7 @@ void ConfigurationMeasurement::Start(Look look) {
   exposures_refused_ = 0;
   exposure_ = 0;  // asked for when the arrivals are durable
   sensing_ = false;
+  is_locating_ = false;
   sense_at_ = fleet_.config.reads_sensors ? fleet_.now() + kSensorsSettle : kNever;
   configuration_.due = fleet_.config.reads_sensors ? sense_at_ : fleet_.now();
   configuration_.SetPhase(ConfigurationPhase::kMeasuring);
@@ -187,7 +181,7 @@ void ConfigurationMeasurement::Take(const ExposureFindings& exposure,
   const PositionerIndex i = measurement.unit;
   const ApplyCommand::Measure& measure = *configuration_.measure;
   UnitView& view = fleet_.units[i].view;
-  const bool put = IsPut(measurement);
+  const bool put = IsPut(measurement.status) && measurement.place;
   view.measurement = measurement.status;
   TakeFibreCarrier(i, measurement);
   view.error_um.reset();

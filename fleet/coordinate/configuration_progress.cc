@@ -126,7 +126,8 @@ void ConfigurationProgress::OnPlan(const PlanDone& done) {
 }
 
 void ConfigurationProgress::TakeRound(const SectorRound& round) {
-  round_.border = {.follows = round.follows, .leads = {}, .finished = round.finished};
+  round_.border = {
+      .follows = round.follows, .leads = {}, .finished = round.finished, .end = round.end};
   for (const SectorRound::LeadsBeyond& leads : round.leads)
     round_.border.leads[leads.unit.value] = leads;
   round_.skew_s = round.start_skew_s;
@@ -144,7 +145,10 @@ void ConfigurationProgress::TakeRound(const SectorRound& round) {
 }
 
 void ConfigurationProgress::Withdraw() {
-  if (configuration_.phase() == Phase::kPlanning) return Gather();
+  // An exposure is no use for a unit that has another target by now.
+  const bool looks =
+      configuration_.phase() == Phase::kMeasuring && rooms_.measurement.look() == Look::kAfter;
+  if (configuration_.phase() == Phase::kPlanning || looks) return Gather();
   if (configuration_.phase() == Phase::kHomeCommitting) {
     TakeBackIntents(fleet_, &round_);
     return Gather();
@@ -377,7 +381,7 @@ void ConfigurationProgress::MeasureOrEnd() {
   if (configuration_.measure && any)
     rooms_.measurement.Start(Look::kAfter);
   else
-    configuration_.EndWhenDurable(ConfigurationState::kDone);
+    configuration_.EndWhenDurable(round_.border.end);
 }
 
 void ConfigurationProgress::OnExposure(const ExposureDone& done) {
@@ -395,7 +399,7 @@ void ConfigurationProgress::TakeMeasurement(ConfigurationMeasurement::Progress p
       return Gather();
     case Look::kAfter:
       if (!taken || !rooms_.corrections.BeginCorrection())
-        return configuration_.EndWhenDurable(ConfigurationState::kDone);
+        return configuration_.EndWhenDurable(round_.border.end);
       sets_out_ = true;
       return Gather();
     case Look::kOnly:

@@ -34,8 +34,8 @@ class ConfigurationProgress {
   void OnPlan(const PlanDone& done);
   /// The part of a plane's plan that this sector carries out. Pre: it waits for it.
   void TakeRound(const SectorRound& round);
-  /// A round that has not started is given back, or a plan is no use any more that is waited for:
-  /// another plan is asked for.
+  /// A round that has not started is given back, or a plan or an exposure is no use any more that
+  /// is waited for: another plan is asked for.
   void Withdraw();
   void OnExposure(const ExposureDone& done);
   /// Goes on as far as it can now.

@@ -12,10 +12,6 @@ std::string Micrometres(double um) {
   return text;
 }
 
-bool IsPut(MeasurementStatus status) {
-  return status == MeasurementStatus::kMeasured || status == MeasurementStatus::kDidNotMove;
-}
-
 std::string WhyNotMeasured(const Coordination& fleet, const ConfigurationView& configuration,
                            PositionerIndex i) {
   const UnitView& view = fleet.units[i].view;

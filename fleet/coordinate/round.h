@@ -29,6 +29,7 @@ struct BorderRound {
   std::vector<SectorRound::FollowsBeyond> follows;
   std::unordered_map<std::uint32_t, SectorRound::LeadsBeyond> leads;  // by unit
   bool finished = false;                                              // no round follows
+  ConfigurationState end = ConfigurationState::kDone;                 // SectorRound::end
   HostInstant start_at = kNever;                                      // kNever: held
 };
 

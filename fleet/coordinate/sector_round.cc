@@ -58,6 +58,9 @@ std::string FaultOf(const SectorRound& round, std::size_t units) {
       !std::isfinite(round.energy_J) || !std::isfinite(round.peak_power_W))
     return "a figure is none";
   if (round.finished && !(round.moves.empty() && round.homing.empty())) return "it ends and moves";
+  const bool ends = IsOver(round.end) && round.end <= ConfigurationState::kFailed;
+  if (!ends || (!round.finished && round.end != ConfigurationState::kDone))
+    return "it ends in a state that is none, or does not end";
   return {};
 }
 

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "fleet/plan/plan.h"
+#include "fleet/records.h"
 #include "protocol/base/ids.h"
 #include "protocol/base/instants.h"
 
@@ -55,7 +56,10 @@ struct SectorRound {
   double energy_J = 0;      // of the same, predicted
   double peak_power_W = 0;  // of the same, predicted
   bool finished = false;    // no round follows: the configuration ends
-  std::string failure;      // why targets that are left fail; empty: by themselves
+  /// With `finished`: the state in which it ends. Targets that are left are stopped with it, or
+  /// fail.
+  ConfigurationState end = ConfigurationState::kDone;
+  std::string failure;  // why targets that are left have not arrived; empty: by themselves
 };
 
 /// The common start, by this sector's clock.

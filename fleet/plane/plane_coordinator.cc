@@ -38,7 +38,10 @@ void PlaneCoordinator::Step(const PlaneInputs& inputs, PlaneEffects* effects) {
   if (in_charge && state_.record.epoch < highest) {
     state_.out->log.push_back("another coordinator is in charge, epoch " +
                               std::to_string(highest.number) + ": this one gives no more orders");
-    state_.Reply(Error{ErrorCode::kUnavailable, "another coordinator took over"}, {});
+    const Error took_over{ErrorCode::kUnavailable, "another coordinator took over"};
+    state_.Reply(took_over, {});
+    for (const Retargeting& one : std::exchange(retargetings_, {}))
+      state_.out->replies.push_back({one.request, true, took_over, {}});
     state_.Enter(PlanePhase::kListening);
   }
   for (const PlanePlanDone& plan : inputs.plans) rounds_.TakePlan(plan);
@@ -219,7 +222,7 @@ void PlaneCoordinator::AnswerRetargets() {
            {}});
       return true;
     }
-    if (state_.kept != state_.record_number || !report || report->configuration != state_.Id() ||
+    if (!state_.IsKept() || !report || report->configuration != state_.Id() ||
         report->change < one.change)
       return false;
     state_.out->replies.push_back(

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "fleet/coordinate/configuration_measurement.h"
 #include "fleet/kinematics.h"
 
 namespace focalfleet {
@@ -115,7 +116,7 @@ MeasuredRound SummaryOf(const ExposureFindings& findings, const PlaneConfigurati
     const std::uint32_t sector = plane.SectorOf(measurement.unit);
     const std::optional<Pose>& target = configuration.targets[measurement.unit.value];
     if (!target || !Looks(sectors, sector, id) || sectors[sector].exposure->first) continue;
-    if (!IsCertain(measurement.status) || !measurement.place) {
+    if (!IsPut(measurement.status) || !measurement.place) {
       ++round.unknown;
       continue;
     }
@@ -126,13 +127,7 @@ MeasuredRound SummaryOf(const ExposureFindings& findings, const PlaneConfigurati
                         std::hypot(measurement.x_mm - wanted.x_mm, measurement.y_mm - wanted.y_mm));
     if (errors_um.back() <= tolerance_um) ++round.within_tolerance;
   }
-  if (errors_um.empty()) return round;
-  double sum = 0;
-  for (const double um : errors_um) sum += um * um;
-  std::ranges::sort(errors_um);
-  round.rms_um = std::sqrt(sum / static_cast<double>(errors_um.size()));
-  round.median_um = errors_um[errors_um.size() / 2];
-  round.worst_um = errors_um.back();
+  Summarise(std::move(errors_um), &round);
   return round;
 }
 

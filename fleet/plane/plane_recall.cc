@@ -39,7 +39,9 @@ void PlaneRecall::Idle() {
     const SectorReport& report = *state_.sectors[sector].report;
     const PlaneConfigurationId configuration = report.configuration;
     const bool knows_none = configuration.number == 0 && report.last_over.number == 0;
-    const bool tells = state_.record.last && state_.record.last->kind == ConfigurationKind::kApply;
+    // Where a measured configuration ended only an exposure tells, and no sector gets one now.
+    const auto& last = state_.record.last;
+    const bool tells = last && last->kind == ConfigurationKind::kApply && !last->measure;
     if (tells && (configuration == state_.Id() || knows_none))
       Recall(sector);
     else
@@ -59,6 +61,7 @@ void PlaneRecall::Recall(std::uint32_t sector) {
                                     .task = PartOf(*state_.record.last, state_.plane, sector)});
     return;
   }
+  Withdraw(sector, &state_.sectors);  // of a round before the end, of which it had not heard
   const bool asks =
       report.stage == SectorStage::kAsking && entry.job != nullptr && entry.job->job == report.job;
   const PlanePart part{report.incarnation, report.job};
@@ -66,7 +69,10 @@ void PlaneRecall::Recall(std::uint32_t sector) {
   parts_[sector] = part;
   ++state_.round;
   SectorRound body;
-  for (std::uint32_t n = 0; n < entry.units; ++n)
+  body.end = state_.record.last_state;
+  const bool stopped = body.end == ConfigurationState::kStopped;
+  if (stopped) body.failure = "the configuration was stopped";
+  for (std::uint32_t n = 0; n < entry.units && !stopped; ++n)
     if (entry.job->targets[n] && !IsAtTarget(*entry.job, n))
       body.refused.push_back(
           {PositionerIndex{n},

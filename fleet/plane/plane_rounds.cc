@@ -38,9 +38,19 @@ PlaneOrder EndOf(std::uint64_t job, const PlaneConfigurationId& id, std::uint64_
           .round_body = std::make_shared<const SectorRound>(std::move(body))};
 }
 
+void Withdraw(std::uint32_t sector, SectorBook* sectors) {
+  const SectorReport& report = *(*sectors)[sector].report;
+  if (report.round != 0 &&
+      (report.stage == SectorStage::kReady || report.stage == SectorStage::kPreparing))
+    sectors->Order(
+        sector,
+        {.kind = OrderKind::kWithdraw, .configuration = report.configuration, .job = report.job});
+}
+
 void PlaneRounds::Begin() {
   tries_ = 0;
   to_home_ = 0;
+  end_ = ConfigurationState::kDone;
 }
 
 // ---- gathering
@@ -89,10 +99,7 @@ PlaneRounds::Readiness PlaneRounds::PrepareOwn(std::uint32_t sector) {
   }
   if (report.stage == SectorStage::kLooking)
     return Looks(state_.sectors, sector, state_.Id()) ? Readiness::kLooks : Readiness::kWaits;
-  if (report.round != 0 &&
-      (report.stage == SectorStage::kReady || report.stage == SectorStage::kPreparing))
-    state_.sectors.Order(
-        sector, {.kind = OrderKind::kWithdraw, .configuration = state_.Id(), .job = report.job});
+  Withdraw(sector, &state_.sectors);
   const bool asks =
       report.stage == SectorStage::kAsking && entry.job != nullptr && entry.job->job == report.job;
   return asks ? Readiness::kReady : Readiness::kWaits;
@@ -140,7 +147,7 @@ void PlaneRounds::Gather() {
   if (!awaited.empty() && state_.now < state_.since + state_.times.gather_patience) return;
   if (looks && (looks_first || ready.empty())) return Look();
   if (!ready.empty()) return Plan(ready, settling);
-  if (awaited.empty()) End(ConfigurationState::kDone);  // all sectors have ended it
+  if (awaited.empty()) End(end_);  // all sectors have ended it
 }
 
 void PlaneRounds::Plan(const std::vector<std::uint32_t>& ready, bool settling) {
@@ -266,6 +273,7 @@ void PlaneRounds::Finish(const std::string& failure, const PlanePlan* plan) {
   for (std::uint32_t sector = 0; sector < state_.sectors.size(); ++sector) {
     if (parts_[sector].job == 0) continue;
     SectorRound body;
+    body.end = end_;
     body.failure = failure;
     if (plan != nullptr) body.refused = plan->rounds[sector].refused;
     const auto own = state_.plane.own(sector);

@@ -46,11 +46,13 @@ class PlaneRounds {
   std::uint64_t exposure_ = 0;       // the same
   std::uint32_t tries_ = 0;          // rounds since the last exposure, or since a unit was homed
   std::size_t to_home_ = 0;          // units that were left to home in the last plan
-  ConfigurationState end_ = ConfigurationState::kDone;
+  ConfigurationState end_ = ConfigurationState::kDone;  // as of the last plan
 };
 
 /// The unit asks for no motion: it stands at its target.
 bool IsAtTarget(const SectorJob& job, std::uint32_t local);
+/// Orders the sector to give back the round that it holds. No effect where it holds none.
+void Withdraw(std::uint32_t sector, SectorBook* sectors);
 /// The order by which a sector that asks ends the configuration.
 PlaneOrder EndOf(std::uint64_t job, const PlaneConfigurationId& id, std::uint64_t round,
                  SectorRound body);

@@ -246,6 +246,7 @@ void PlaneInProcess::TurnPlane(std::uint32_t which) {
   std::vector<PlanePlanDone> plans;
   if (at.job && now_ >= at.job_due) {
     plans.push_back(RunPlaneJob(*std::exchange(at.job, {}), *layout_));
+    if (at.plan_fault) at.plan_fault(&plans.back());
     due = true;
   }
   const auto exposures = at.camera.TakeDue(now_, layout_->layout(), drives_, *world_);

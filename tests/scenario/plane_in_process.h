@@ -72,6 +72,7 @@ class PlaneInProcess {
     std::vector<PlaneCommand> commands;
     std::optional<PlaneJob> job;
     HostInstant job_due = kNever;
+    std::function<void(PlanePlanDone*)> plan_fault;  // may change a plan
     DelayedCamera camera{{}};
     std::vector<ReplyEffect> replies;  // all
     std::vector<std::string> log;      // all

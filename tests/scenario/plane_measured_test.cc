@@ -147,6 +147,55 @@ TEST(MeasuredPlane, GoesOnAfterKillsWhileTheCameraLooks) {
   }
 }
 
+// Otherwise the unit would end as if it had not arrived, though it was said that it goes.
+TEST(MeasuredPlane, AUnitGetsAnotherTargetWhileTheCameraLooks) {
+  Judged judged(11);
+  PlaneInProcess& plane = judged.plane;
+  const PositionerIndex unit = plane.layout().own(1)[2];
+  const Pose other = PlaceOf(plane.unit(unit).knowledge);
+  ApplyMeasured(&plane, plane.DrawTargets(11), 0);
+  ASSERT_TRUE(plane.RunUntil([&] { return plane.plane().view().phase == PlanePhase::kMeasuring; },
+                             Seconds(400)));
+  const std::uint64_t request = plane.Give(PlaneRetargetCommand{unit, other});
+  ASSERT_TRUE(plane.RunUntil([&] { return plane.IsIdle(); }, Seconds(2000)));
+  ASSERT_NE(plane.ReplyTo(request), nullptr);
+  EXPECT_FALSE(plane.ReplyTo(request)->error);
+  EXPECT_EQ(plane.unit(unit).target, other);
+  EXPECT_LT(ErrorUm(&plane, unit, other), 200);
+  ASSERT_TRUE(plane.unit(unit).error_um);
+  EXPECT_NEAR(*plane.unit(unit).error_um, ErrorUm(&plane, unit, other), 1);
+}
+
+TEST(MeasuredPlane, APlanThatFailsAfterAnExposureIsAFailureOfTheConfiguration) {
+  Judged judged(9);
+  PlaneInProcess& plane = judged.plane;
+  plane.planes[0].plan_fault = [&](PlanePlanDone* done) {
+    if (!plane.plane().view().measured.empty())
+      done->plan = Fail(ErrorCode::kRefused, "no way at all");
+  };
+  ApplyMeasured(&plane, plane.DrawTargets(9), 2);
+  ASSERT_TRUE(Finish(&plane));
+  const PlaneView& view = plane.plane().view();
+  EXPECT_EQ(view.state, ConfigurationState::kFailed);
+  EXPECT_GT(view.counts.failed, 0u);
+  for (const PlaneInProcess::Sector& sector : plane.sectors)
+    EXPECT_EQ(sector.coordinator->configuration().state, ConfigurationState::kFailed);
+}
+
+TEST(MeasuredPlane, ASectorsNextLifeIsNotSentIntoAConfigurationThatIsOver) {
+  Judged judged(10);
+  PlaneInProcess& plane = judged.plane;
+  ApplyMeasured(&plane, plane.DrawTargets(10), 1);
+  ASSERT_TRUE(Finish(&plane));
+  const OutcomeCounts counts = plane.plane().view().counts;
+  plane.KillSector(1);
+  plane.Run(Seconds(1));
+  plane.StartSector(1);
+  plane.Run(Seconds(20));
+  EXPECT_EQ(plane.sectors[1].coordinator->sector().stage, SectorStage::kIdle);
+  EXPECT_EQ(plane.plane().view().counts, counts);
+}
+
 TEST(MeasuredPlane, AnExposureThatCannotBeUsedIsTriedAgain) {
   Judged judged(7);
   PlaneInProcess& plane = judged.plane;

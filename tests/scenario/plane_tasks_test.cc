@@ -244,6 +244,25 @@ TEST(PlaneTasks, OtherTargetsAreNotForgottenWithAKill) {
   EXPECT_NE(plane.unit(unit).outcome, TargetOutcome::kPending);
 }
 
+// A sector that hears of a configuration only after the stop has refused nothing.
+TEST(PlaneTasks, AStopBeforeASectorHasItsTaskIsAStopThere) {
+  Judged judged(8);
+  PlaneInProcess& plane = judged.plane;
+  plane.KillSector(1);
+  plane.Run(Seconds(1));
+  plane.Apply(plane.DrawTargets(8));
+  plane.Run(Seconds(1));
+  plane.Stop();
+  ASSERT_TRUE(plane.RunUntil([&] { return plane.IsIdle(); }, Seconds(30)));
+  plane.StartSector(1);
+  plane.Run(Seconds(15));
+  for (const PositionerIndex i : plane.layout().own(1)) {
+    EXPECT_EQ(plane.unit(i).outcome, TargetOutcome::kStopped);
+    EXPECT_EQ(plane.unit(i).outcome_reason, "the configuration was stopped");
+  }
+  EXPECT_EQ(plane.plane().view().counts.stopped, plane.plane().view().counts.targeted);
+}
+
 TEST(PlaneTasks, NoOtherTargetsWithoutAConfiguration) {
   Judged judged(7);
   PlaneInProcess& plane = judged.plane;

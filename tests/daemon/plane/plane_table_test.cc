@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <regex>
@@ -10,9 +11,11 @@
 #include <string>
 
 #include "daemon/plane/plane_alarms.h"
+#include "daemon/plane/plane_commands.h"
 #include "daemon/plane/plane_metrics.h"
 #include "daemon/plane/plane_refusal.h"
 #include "fleet/hex_layout.h"
+#include "fleet/kinematics.h"
 
 namespace focalfleet {
 namespace {
@@ -47,6 +50,40 @@ class Bench {
     SectorReport report{.sector = sector, .incarnation = 1, .number = 1, .door = door};
     PlaneEffects out;
     coordinator_.Step({.now = HostInstant{1}, .reports = {&report, 1}}, &out);
+  }
+  /// Both sectors follow the coordinator; sector 0 alone has said where its units stand.
+  void Join() {
+    SectorReport reports[2];
+    for (std::uint32_t n = 0; n < 2; ++n)
+      reports[n] = {.sector = n,
+                    .incarnation = 1,
+                    .layout = DigestOf(*plane_.layout().Part(plane_.own(n))),
+                    .unordered = Seconds(100)};
+    auto places = std::make_shared<SectorPlaces>();
+    places->places.assign(10, Exactly(Witness::kReported, {100, 100}));
+    places->drives.resize(10);
+    reports[0].places = places;
+    std::uint64_t kept = 0;
+    for (int n = 1; n <= 30; ++n) {
+      const HostInstant now{Milliseconds(100 * n).ns};
+      for (SectorReport& report : reports) {
+        ++report.number;
+        report.echo = SectorReport::Echo{now, now, now};
+      }
+      PlaneEffects out;
+      coordinator_.Step({.now = now, .reports = reports, .kept = kept}, &out);
+      if (out.record) kept = out.record_number;
+      for (const PlaneOrder& order : out.orders) reports[order.sector].accepted = order.epoch;
+    }
+    ASSERT_TRUE(coordinator_.sectors().IsUsable(0) && coordinator_.sectors().IsUsable(1));
+  }
+  /// The preview of one target for a unit of the sector.
+  [[nodiscard]] Result<PlanePreview> Preview(std::uint32_t sector) {
+    const Unit& unit = plane_.layout().unit(plane_.own(sector)[0]);
+    const PointFp aim = FibreAt(unit, AxisAngles{20, 150});
+    const std::string row = std::to_string(unit.id.value) + "," + std::to_string(aim.x_mm) + "," +
+                            std::to_string(aim.y_mm) + "\n";
+    return PlanePreviewOf(instant(), {{"targets_csv", "unit_id,x_mm,y_mm\n" + row}});
   }
   [[nodiscard]] Json State() const {
     return Json::parse(table_.StateText(coordinator_.sectors(), now_));
@@ -144,6 +181,23 @@ TEST(PlaneMetrics, AreThoseOfTheManualAndFollowTheTable) {
     EXPECT_THAT(manual, HasSubstr("| `" + (*at)[1].str() + "` | ")) << (*at)[2].str();
   }
   EXPECT_GT(count, 15u);
+}
+
+// A sector that is busy, or has just been heard, has published its units and has given no places.
+TEST(PlanePreview, TakesUnitsWithoutAPlaceForObstacles) {
+  Bench bench;
+  bench.Join();
+  bench.Say(0);
+  bench.Say(1);
+  const auto made = bench.Preview(0);
+  ASSERT_TRUE(made.has_value()) << made.error().text;
+  EXPECT_EQ(made->preview.targeted, 1u);
+  EXPECT_EQ(made->preview.refused.size(), 0u);
+  const auto frozen = std::ranges::count(made->preview.job.frozen, 1);
+  EXPECT_EQ(frozen, 10);
+  const auto unknown = bench.Preview(1);
+  ASSERT_FALSE(unknown.has_value());
+  EXPECT_THAT(unknown.error().text, HasSubstr("is of sector 1, which has not said"));
 }
 
 TEST(PlaneRefusal, NamesTheDaemonThatHasTheUnit) {

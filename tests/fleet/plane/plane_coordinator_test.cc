@@ -14,6 +14,31 @@ PlaneLayout TwoSectors() {
   return std::move(*PlaneLayout::Create(std::move(*layout), {{{0}}, {{1}}}));
 }
 
+/// Configuration 5 of 20 targets is over.
+PlaneRecord Ended(ConfigurationState state) {
+  PlaneRecord kept{.epoch = {3, kSelf}, .next_configuration = 6, .under_way = {}};
+  kept.last = PlaneConfiguration{.id = 5, .source = "test"};
+  kept.last->targets.assign(20, Pose{4, 4});
+  kept.last_state = state;
+  return kept;
+}
+
+/// A sector of ten units asks for a plan; one of them does not stand at its target.
+void AskInLast(SectorReport* report) {
+  report->configuration = {kSelf, 5};
+  report->stage = SectorStage::kAsking;
+  report->job = 2;
+  SectorJob job{.job = 2};
+  const Pose there{4, 4};
+  job.start.assign(10, Exactly(Witness::kReported, there));
+  job.start[7] = Exactly(Witness::kReported, {4, 5});
+  job.targets.assign(10, there);
+  job.frozen.resize(10);
+  job.offsets.resize(10);
+  job.drives.resize(10);
+  report->body = std::make_shared<const SectorJob>(std::move(job));
+}
+
 /// A coordinator, and what its two sectors report.
 class Bench {
  public:
@@ -155,10 +180,7 @@ TEST(PlaneCoordinator, GoesOnWithTheConfigurationOfItsEarlierLife) {
 
 // Units that have arrived are reported as arrived by the next life of their sector, too.
 TEST(PlaneCoordinator, LetsANewLifeOfASectorHearOfTheLastConfiguration) {
-  PlaneRecord kept{.epoch = {3, kSelf}, .next_configuration = 6, .under_way = {}};
-  kept.last = PlaneConfiguration{.id = 5, .source = "test"};
-  kept.last->targets.assign(20, Pose{4, 4});
-  Bench bench(kept);
+  Bench bench(Ended(ConfigurationState::kDone));
   for (SectorReport& report : bench.reports) report.counts.arrived = 10;
   bench.reports[0].last_over = {kSelf, 5};
   ASSERT_TRUE(bench.Until(PlanePhase::kIdle));
@@ -170,23 +192,13 @@ TEST(PlaneCoordinator, LetsANewLifeOfASectorHearOfTheLastConfiguration) {
   EXPECT_EQ(bench.orders[1].configuration, (PlaneConfigurationId{kSelf, 5}));
   // The sector asks; nothing moves, and only what does not stand at its target is refused.
   SectorReport& report = bench.reports[1];
-  report.configuration = {kSelf, 5};
-  report.stage = SectorStage::kAsking;
-  report.job = 2;
-  SectorJob job{.job = 2};
-  const Pose there{4, 4};
-  job.start.assign(10, Exactly(Witness::kReported, there));
-  job.start[7] = Exactly(Witness::kReported, {4, 5});
-  job.targets.assign(10, there);
-  job.frozen.resize(10);
-  job.offsets.resize(10);
-  job.drives.resize(10);
-  report.body = std::make_shared<const SectorJob>(std::move(job));
+  AskInLast(&report);
   bench.Step(0.3);
   ASSERT_EQ(bench.orders[1].kind, OrderKind::kRound);
   ASSERT_NE(bench.orders[1].round_body, nullptr);
   const SectorRound& round = *bench.orders[1].round_body;
   EXPECT_TRUE(round.finished);
+  EXPECT_EQ(round.end, ConfigurationState::kDone);
   EXPECT_TRUE(round.moves.empty());
   ASSERT_EQ(round.refused.size(), 1u);
   EXPECT_EQ(round.refused[0].unit, PositionerIndex{7});
@@ -198,6 +210,71 @@ TEST(PlaneCoordinator, LetsANewLifeOfASectorHearOfTheLastConfiguration) {
   bench.Step(0.3);
   EXPECT_EQ(bench.view().counts.arrived, 19u);
   EXPECT_EQ(bench.view().counts.refused, 1u);
+}
+
+// Nobody has refused the targets of a configuration that was stopped.
+TEST(PlaneCoordinator, LetsANewLifeOfASectorHearOfAStop) {
+  Bench bench(Ended(ConfigurationState::kStopped));
+  ASSERT_TRUE(bench.Until(PlanePhase::kIdle));
+  bench.Step(0.3);
+  AskInLast(&bench.reports[1]);
+  bench.Step(0.3);
+  ASSERT_EQ(bench.orders[1].kind, OrderKind::kRound);
+  ASSERT_NE(bench.orders[1].round_body, nullptr);
+  const SectorRound& round = *bench.orders[1].round_body;
+  EXPECT_TRUE(round.finished);
+  EXPECT_EQ(round.end, ConfigurationState::kStopped);
+  EXPECT_EQ(round.refused.size(), 0u);
+  EXPECT_EQ(round.failure, "the configuration was stopped");
+}
+
+// A sector that was cut off while it held a round may hear of nothing but the end.
+TEST(PlaneCoordinator, TakesBackARoundThatIsHeldAfterTheEnd) {
+  Bench bench(Ended(ConfigurationState::kDone));
+  SectorReport& report = bench.reports[1];
+  report.configuration = {kSelf, 5};
+  report.stage = SectorStage::kReady;
+  report.job = 2;
+  report.round = 4;
+  ASSERT_TRUE(bench.Until(PlanePhase::kIdle));
+  bench.Step(0.3);
+  bench.Step(0.3);
+  EXPECT_EQ(bench.orders[1].kind, OrderKind::kWithdraw);
+  EXPECT_EQ(bench.orders[1].configuration, (PlaneConfigurationId{kSelf, 5}));
+  EXPECT_EQ(bench.orders[1].job, 2u);
+}
+
+// No sector gets an exposure after the end, so none is sent into a measured configuration again.
+TEST(PlaneCoordinator, LeavesANewLifeOfASectorOutOfAMeasuredConfiguration) {
+  PlaneRecord kept = Ended(ConfigurationState::kDone);
+  kept.last->measure = ApplyCommand::Measure{};
+  Bench bench(kept);
+  bench.reports[0].configuration = {kSelf, 5};
+  bench.reports[0].stage = SectorStage::kLooking;
+  ASSERT_TRUE(bench.Until(PlanePhase::kIdle));
+  bench.Step(0.3);
+  bench.Step(0.3);
+  EXPECT_EQ(bench.orders[0].kind, OrderKind::kStop);
+  EXPECT_EQ(bench.orders[1].kind, OrderKind::kStand);
+}
+
+TEST(PlaneCoordinator, AnswersOtherTargetsWhenAnotherOneTakesOver) {
+  Bench bench;
+  ASSERT_TRUE(bench.Until(PlanePhase::kIdle));
+  bench.commands.push_back({1, bench.Apply()});
+  ASSERT_TRUE(bench.Until(PlanePhase::kGathering));
+  bench.commands.push_back({2, PlaneRetargetCommand{{3}, {2, 2}}});
+  bench.Step();
+  EXPECT_TRUE(bench.out.replies.empty());
+  bench.obeys = false;
+  bench.reports[0].accepted = {9, 2};
+  bench.Step();
+  ASSERT_EQ(bench.out.replies.size(), 2u);
+  for (const ReplyEffect& reply : bench.out.replies) {
+    EXPECT_TRUE(reply.last);
+    ASSERT_TRUE(reply.error);
+    EXPECT_EQ(reply.error->text, "another coordinator took over");
+  }
 }
 
 TEST(PlaneCoordinator, StopsAConfigurationThatItDoesNotKnow) {
