@@ -13,7 +13,28 @@ constexpr double kJointMarginMm = 0.03;
 constexpr int kGrowSteps = 12;  // of one branch
 constexpr int kNearTarget = 4;  // one sample in so many is the root of the other tree
 
+bool IsWithin(const SegmentFp& a, const SegmentFp& b, double distance_mm) {
+  return SquaredDistance(a, b) <= distance_mm * distance_mm;
+}
+
 }  // namespace
+
+/// The arm at the begin of the step, in its middle and at its end. No point of it is farther than
+/// `sweep_mm` from the line in the middle, because both ends of a line bound what lies between.
+struct JointSearch::Swept {
+  std::array<SegmentFp, 3> lines;
+  double sweep_mm = 0;
+
+  Swept() = default;
+  Swept(const ArmGeometry& arm, const Pose& from, const Pose& to)
+      : lines{arm.At(from), arm.At({(from[0] + to[0]) / 2, (from[1] + to[1]) / 2}), arm.At(to)} {
+    constexpr double kGuardMm = 1e-5;  // ten times what the distance of two segments may be off
+    for (const SegmentFp& line : {lines[0], lines[2]})
+      sweep_mm =
+          std::max({sweep_mm, DistanceMm(line.a, lines[1].a), DistanceMm(line.b, lines[1].b)});
+    sweep_mm += kGuardMm;
+  }
+};
 
 std::int32_t JointSearch::StepsOf(std::size_t m, const Poses& a, const Poses& b) const {
   std::int32_t most = 0;
@@ -37,28 +58,38 @@ JointSearch::Poses JointSearch::Towards(const Poses& from, const Poses& to) cons
   return next;
 }
 
+/// The begin of the step was looked at as the end of the one before.
+bool JointSearch::StandsClear(std::size_t m, const Swept& arm) const {
+  for (const Bundle& bundle : bundles_[m]) {
+    const Capsule& around = bundle.around;
+    if (!IsWithin(arm.lines[1], around.line, around.radius_mm + arm.sweep_mm)) continue;
+    for (std::uint32_t k = bundle.begin; k < bundle.end; ++k) {
+      const StandingThing& thing = q_.members[m].standing[k];
+      const double need_mm = thing.need_mm + thing.capsule.radius_mm;
+      if (IsWithin(arm.lines[2], thing.capsule.line, need_mm) ||
+          IsWithin(arm.lines[1], thing.capsule.line, need_mm))
+        return false;
+    }
+  }
+  return true;
+}
+
 /// Each member may be at the begin of the step, in its middle or at its end while another is at any
 /// of these: a start skew is less than a step.
 bool JointSearch::StepClear(const Poses& from, const Poses& to) {
   ++work_;
-  std::array<std::array<SegmentFp, 3>, kMembersMax> lines;
+  std::array<Swept, kMembersMax> arms;
   for (std::size_t m = 0; m < size(); ++m) {
-    const ArmGeometry& arm = *q_.members[m].arm;
-    lines[m][0] = arm.At(from[m]);
-    lines[m][2] = arm.At(to[m]);
-    const Pose middle{(from[m][0] + to[m][0]) / 2, (from[m][1] + to[m][1]) / 2};
-    lines[m][1] = arm.At(middle);
-    for (const StandingThing& thing : q_.members[m].standing) {
-      const double need = thing.need_mm + thing.capsule.radius_mm;
-      if (SquaredDistance(lines[m][2], thing.capsule.line) <= need * need ||
-          SquaredDistance(lines[m][1], thing.capsule.line) <= need * need)
-        return false;
-    }
+    arms[m] = Swept(*q_.members[m].arm, from[m], to[m]);
+    if (!StandsClear(m, arms[m])) return false;
     for (std::size_t other = 0; other < m; ++other) {
-      const double need = apart_mm_[other][m];
-      for (const SegmentFp& a : lines[other])
-        for (const SegmentFp& b : lines[m])
-          if (SquaredDistance(a, b) <= need * need) return false;
+      const double need_mm = apart_mm_[other][m];
+      if (!IsWithin(arms[other].lines[1], arms[m].lines[1],
+                    need_mm + arms[other].sweep_mm + arms[m].sweep_mm))
+        continue;
+      for (const SegmentFp& a : arms[other].lines)
+        for (const SegmentFp& b : arms[m].lines)
+          if (IsWithin(a, b, need_mm)) return false;
     }
   }
   return true;
@@ -270,6 +301,7 @@ std::optional<JointSearch::Found> JointSearch::Find(const Question& question, Rn
       const double need = q_.need_mm[other][m];
       apart_mm_[other][m] = need + std::clamp((least - need) / 2, 0.0, kJointMarginMm);
     }
+    BundleUp(q_.members[m].standing, &bundles_[m]);
   }
   if (!Connect(rng)) return std::nullopt;
   Shorten(rng);

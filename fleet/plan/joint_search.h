@@ -17,6 +17,7 @@
 #include <span>
 #include <vector>
 
+#include "fleet/plan/bundles.h"
 #include "fleet/plan/occupancy.h"
 #include "fleet/plan/pose_grid.h"
 #include "protocol/base/rng.h"
@@ -70,6 +71,8 @@ class JointSearch {
   [[nodiscard]] std::int32_t StepsBetween(const Poses& a, const Poses& b) const;
   [[nodiscard]] std::int32_t StepsOf(std::size_t m, const Poses& a, const Poses& b) const;
   [[nodiscard]] Poses Towards(const Poses& from, const Poses& to) const;
+  struct Swept;
+  [[nodiscard]] bool StandsClear(std::size_t m, const Swept& arm) const;
   [[nodiscard]] bool StepClear(const Poses& from, const Poses& to);
   [[nodiscard]] Poses Draw(Rng* rng) const;
   [[nodiscard]] std::int32_t Nearest(const Tree& tree, const Poses& to) const;
@@ -83,6 +86,7 @@ class JointSearch {
   /// The distance at which two members are distinguished, with a margin where both ends have it.
   std::array<std::array<double, kMembersMax>, kMembersMax> apart_mm_{};
   std::array<Pose, kMembersMax> step_{};
+  std::array<std::vector<Bundle>, kMembersMax> bundles_;  // of what stands
   Tree forward_;
   Tree backward_;
   std::vector<Poses> way_;
