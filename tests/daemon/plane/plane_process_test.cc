@@ -106,6 +106,15 @@ class PlaneProcesses : public ::testing::Test {
         },
         kPatienceMs);
   }
+  /// The configuration that is under way, if any, comes to its end.
+  [[nodiscard]] bool Ends() const {
+    return test::WaitUntil(
+        [&] {
+          const auto status = Ask("plane", "status");
+          return status && (*status)["busy"] == false;
+        },
+        kPatienceMs);
+  }
   [[nodiscard]] std::string Log(const std::string& name) const {
     std::ifstream file(scratch_ / (name + ".log"));
     return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
@@ -270,13 +279,7 @@ TEST_F(PlaneProcesses, HomeAndGiveOtherTargets) {
       Ask("plane", "retarget", {{"unit_id", id}, {"theta_deg", 20}, {"phi_deg", 150}});
   ASSERT_TRUE(other.has_value()) << other.error().text << Logs();
   EXPECT_EQ((*other)["goes"], true) << *other;
-  ASSERT_TRUE(test::WaitUntil(
-      [&] {
-        const auto status = Ask("plane", "status");
-        return status && (*status)["busy"] == false;
-      },
-      kPatienceMs))
-      << Logs();
+  ASSERT_TRUE(Ends()) << Logs();
   const auto unit = Ask("s0", "unit", {{"unit_id", id}});
   ASSERT_TRUE(unit.has_value()) << unit.error().text;
   const PointFp aim = FibreAt(layout_->units()[11], AxisAngles{20, 150});
@@ -372,13 +375,7 @@ TEST_F(PlaneProcesses, StopInAllSectors) {
       kPatienceMs))
       << Logs();
   ASSERT_TRUE(Ask("plane", "stop").has_value());
-  ASSERT_TRUE(test::WaitUntil(
-      [&] {
-        const auto status = Ask("plane", "status");
-        return status && (*status)["busy"] == false;
-      },
-      kPatienceMs))
-      << Logs();
+  ASSERT_TRUE(Ends()) << Logs();
   const auto status = Ask("plane", "status");
   EXPECT_EQ((*status)["configuration"]["state"], "stopped") << *status << Logs();
   EXPECT_GT((*status)["configuration"]["stopped"], 0) << *status;

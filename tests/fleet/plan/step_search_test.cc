@@ -1,10 +1,14 @@
 // Searches over sets of poses: for one unit against a plain table of costs, for two hooked units of
 // a dense plate against what their arms need together.
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <span>
 #include <vector>
 
+#include "fleet/plan/joint_search.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/soft_search.h"
 #include "tests/fleet/plan/planning.h"
@@ -133,6 +137,96 @@ TEST(PairSearch, HookedUnitsGoTogether) {
   // A joint search over their four axes, with clearances at its nodes alone, finds 19 s.
   EXPECT_LE(plan->makespan_s, 1.05 * 19);
   EXPECT_GE(plan->makespan_s, plan->pair_bound_s);
+}
+
+/// Two units that reach over each other, in a crowd of covers of units that stand for long.
+struct Crowded {
+  PlanningFleet fleet = FleetOf({UnitAt(1, 0), UnitAt(2, 18)});
+  Scene scene{fleet.layout, fleet.drives, fleet.start};
+  std::vector<StandingThing> crowd;
+  std::array<std::array<Pose, 2>, 2> ends;  // of each member: from, to
+  static constexpr double kNeedMm = 2;
+
+  explicit Crowded(Rng rng) {
+    for (std::size_t end = 0; end < 2; ++end) {
+      do
+        for (std::uint32_t m = 0; m < 2; ++m)
+          ends[m][end] = PoseDeg(fleet, m, rng.Uniform(-180, 180), rng.Uniform(0, 175));
+      while (DistanceMm(ArmOf(0, end), ArmOf(1, end)) < kNeedMm + 0.5);
+    }
+    for (std::uint32_t by = 0; by < 12; ++by) {
+      const PointFp around{rng.Uniform(-15, 33), rng.Uniform(-15, 15)};
+      for (int k = 0; k < 40; ++k) {
+        const double turn = 0.05 * k;
+        const SegmentFp line{around,
+                             {around.x_mm + 3 * std::cos(turn), around.y_mm + 3 * std::sin(turn)}};
+        double least_mm = std::numeric_limits<double>::max();
+        for (std::uint32_t m = 0; m < 2; ++m)
+          for (std::size_t end = 0; end < 2; ++end)
+            least_mm = std::min(least_mm, DistanceMm(ArmOf(m, end), line));
+        if (least_mm > kNeedMm + 0.6) crowd.push_back({{line, 0.1}, kNeedMm, kNeedMm, by, false});
+      }
+    }
+  }
+  [[nodiscard]] SegmentFp ArmOf(std::uint32_t m, std::size_t end) const {
+    return scene.arm(m).At(ends[m][end]);
+  }
+  [[nodiscard]] std::optional<JointSearch::Found> Find(
+      std::uint64_t seed, std::span<const StandingThing> things) const {
+    JointSearch::Question question{.steps = {.ticks = 5340, .count = 190}, .end_step = 180};
+    std::array<JointSearch::Member, 2> members;
+    for (std::uint32_t m = 0; m < 2; ++m)
+      members[m] = {.arm = &scene.arm(m),
+                    .drive = &fleet.drives[m],
+                    .standing = things,
+                    .from = ends[m][0],
+                    .to = ends[m][1],
+                    .within = scene.arm(m).range()};
+    question.members = members;
+    question.need_mm[0][1] = kNeedMm;
+    Rng rng(seed);
+    return JointSearch().Find(question, &rng);
+  }
+};
+
+TEST(JointSearch, WaysAreClearOfACrowdHoweverItIsBundled) {
+  int found_ways = 0;
+  for (std::uint64_t k = 0; k < 40; ++k) {
+    const std::uint64_t seed = Seed(k);
+    FOCALFLEET_TRACE_SEED(seed);
+    const Crowded here(Rng::Stream(seed, "crowd"));
+    const auto found = here.Find(seed, here.crowd);
+    std::vector<StandingThing> alone = here.crowd;  // each thing is a bundle
+    for (std::uint32_t n = 0; n < alone.size(); ++n) alone[n].by = n;
+    const auto again = here.Find(seed, alone);
+    ASSERT_EQ(found.has_value(), again.has_value());
+    if (!found) continue;
+    ++found_ways;
+    std::array<Track, 2> tracks;
+    for (std::uint32_t m = 0; m < 2; ++m) {
+      for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+        EXPECT_TRUE(
+            std::ranges::equal(found->paths[m][axis].segments(), again->paths[m][axis].segments()));
+      tracks[m] = Track(here.scene.arm(m), here.fleet.drives[m], here.ends[m][0], found->paths[m]);
+    }
+    // Within a step arms come nearer than at the three looks by little.
+    constexpr double kWithinStepMm = 0.05;
+    for (double t_s = 0; t_s < std::max(tracks[0].end_s(), tracks[1].end_s()); t_s += 0.05) {
+      std::array<SegmentFp, 2> arms;
+      for (std::uint32_t m = 0; m < 2; ++m) {
+        const auto legs = tracks[m].legs();
+        const auto leg = std::find_if(legs.begin(), legs.end(),
+                                      [&](const Leg& each) { return t_s < each.end_s; });
+        arms[m] = ArmAt(here.scene.arm(m), *leg, t_s);
+        for (const StandingThing& thing : here.crowd)
+          ASSERT_GT(DistanceMm(arms[m], thing.capsule.line),
+                    thing.need_mm + thing.capsule.radius_mm - kWithinStepMm);
+      }
+      ASSERT_GT(DistanceMm(arms[0], arms[1]), Crowded::kNeedMm - kWithinStepMm);
+    }
+  }
+  EXPECT_GT(found_ways, 10);
+  EXPECT_LT(found_ways, 40) << "the crowd stands in nobody's way";
 }
 
 TEST(Scene, AUnitOfUnknownPlaceTakesTheDiscThatItReaches) {
