@@ -139,15 +139,15 @@ TEST(PairSearch, HookedUnitsGoTogether) {
   EXPECT_GE(plan->makespan_s, plan->pair_bound_s);
 }
 
-/// Two units that reach over each other, in a crowd of covers of units that stand for long.
-struct Crowded {
+/// Two units that reach over each other, among the covers of units whose place is not known.
+struct Beset {
   PlanningFleet fleet = FleetOf({UnitAt(1, 0), UnitAt(2, 18)});
   Scene scene{fleet.layout, fleet.drives, fleet.start};
-  std::vector<StandingThing> crowd;
+  std::vector<StandingThing> covers;
   std::array<std::array<Pose, 2>, 2> ends;  // of each member: from, to
   static constexpr double kNeedMm = 2;
 
-  explicit Crowded(Rng rng) {
+  explicit Beset(Rng rng) {
     for (std::size_t end = 0; end < 2; ++end) {
       do
         for (std::uint32_t m = 0; m < 2; ++m)
@@ -164,7 +164,7 @@ struct Crowded {
         for (std::uint32_t m = 0; m < 2; ++m)
           for (std::size_t end = 0; end < 2; ++end)
             least_mm = std::min(least_mm, DistanceMm(ArmOf(m, end), line));
-        if (least_mm > kNeedMm + 0.6) crowd.push_back({{line, 0.1}, kNeedMm, kNeedMm, by, false});
+        if (least_mm > kNeedMm + 0.6) covers.push_back({{line, 0.1}, kNeedMm, kNeedMm, by, false});
       }
     }
   }
@@ -189,14 +189,14 @@ struct Crowded {
   }
 };
 
-TEST(JointSearch, WaysAreClearOfACrowdHoweverItIsBundled) {
+TEST(JointSearch, WaysAreClearOfCoversHoweverTheyAreBundled) {
   int found_ways = 0;
   for (std::uint64_t k = 0; k < 40; ++k) {
     const std::uint64_t seed = Seed(k);
     FOCALFLEET_TRACE_SEED(seed);
-    const Crowded here(Rng::Stream(seed, "crowd"));
-    const auto found = here.Find(seed, here.crowd);
-    std::vector<StandingThing> alone = here.crowd;  // each thing is a bundle
+    const Beset here(Rng::Stream(seed, "covers"));
+    const auto found = here.Find(seed, here.covers);
+    std::vector<StandingThing> alone = here.covers;  // each thing is a bundle
     for (std::uint32_t n = 0; n < alone.size(); ++n) alone[n].by = n;
     const auto again = here.Find(seed, alone);
     ASSERT_EQ(found.has_value(), again.has_value());
@@ -218,15 +218,15 @@ TEST(JointSearch, WaysAreClearOfACrowdHoweverItIsBundled) {
         const auto leg = std::find_if(legs.begin(), legs.end(),
                                       [&](const Leg& each) { return t_s < each.end_s; });
         arms[m] = ArmAt(here.scene.arm(m), *leg, t_s);
-        for (const StandingThing& thing : here.crowd)
+        for (const StandingThing& thing : here.covers)
           ASSERT_GT(DistanceMm(arms[m], thing.capsule.line),
                     thing.need_mm + thing.capsule.radius_mm - kWithinStepMm);
       }
-      ASSERT_GT(DistanceMm(arms[0], arms[1]), Crowded::kNeedMm - kWithinStepMm);
+      ASSERT_GT(DistanceMm(arms[0], arms[1]), Beset::kNeedMm - kWithinStepMm);
     }
   }
   EXPECT_GT(found_ways, 10);
-  EXPECT_LT(found_ways, 40) << "the crowd stands in nobody's way";
+  EXPECT_LT(found_ways, 40) << "the covers stand in nobody's way";
 }
 
 TEST(Scene, AUnitOfUnknownPlaceTakesTheDiscThatItReaches) {
