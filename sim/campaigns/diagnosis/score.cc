@@ -383,7 +383,7 @@ std::vector<ScorePass> ScoreWithouts(const Fit& fit, const Templates& templates,
                       ListShared(fit.model.terms, withouts)};
   std::vector<ScorePass> passes(withouts.size(), EmptyPass(templates, units));
   FleetSums all = EmptySums(plan, {0, units});
-  // Chunks run a few at a time, because the part of each is as large as a pass.
+  // Chunks run a few at a time, because the sums of each may be as large as a pass.
   constexpr std::size_t kAtOnce = 8;
   const std::vector<UnitChunk> chunks = ChunksOf(units);
   for (std::size_t begin = 0; begin < chunks.size(); begin += kAtOnce) {

@@ -58,6 +58,29 @@ TEST(Score, AUnitWithAnImpossibleAmplitudeCountsForTheFleet) {
   EXPECT_GT(impossible, 10u);
 }
 
+// Chunks of units sum the exposures that they saw, each in its place among those of the campaign.
+TEST(Score, ExposuresOfOneUnitSumUpToThatUnit) {
+  Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1}});
+  std::iota(campaign.move_id.begin(), campaign.move_id.end(), 1);  // no two units share one
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Fit fit = StaticFit(facts);
+  for (const char* cause : {"friction_windup", "eccentricity"}) {
+    const Template form = Of(cause, facts);
+    const std::size_t c = form.columns;
+    const Score score = ScoreTemplates(fit, {form}).scores[0];
+    ASSERT_EQ(score.exposure_b.size(), facts.exposures.size() * c);
+    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+      double b = 0, g = 0;
+      for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+        b += score.exposure_b[facts.exposures.of_row[row] * c];
+        g += score.exposure_g[facts.exposures.of_row[row] * c * c];
+      }
+      EXPECT_NEAR(b, score.b[unit * c], 1e-9 * (1 + std::abs(b))) << cause;
+      EXPECT_NEAR(g, score.g[unit * c * c], 1e-9 * (1 + g)) << cause;
+    }
+  }
+}
+
 // Signatures made once for several looks give the same as those made for each look alone.
 TEST(Score, LooksTogetherAreWhatTheyAreAlone) {
   const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1}});
