@@ -21,9 +21,11 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
   const bool has_events = AddEvents(rule.family_wise, &stepped) > 0;
   Selection selection = Select(templates, rule, fit);
   if (!has_events) return selection;
-  // The effect of a cause on a few moves looks like steps until the cause is known.
+  // The effect of a cause on a few moves looks like steps until the cause is known. Steps that the
+  // rest does not pay for then are no reason for another search.
   Fit explained = *fit;
-  if (AddEvents(rule.family_wise, &explained) == 0) return selection;
+  if (AddEvents(rule.family_wise, &explained) == 0 || BetterBy(explained, *fit) <= 0)
+    return selection;
   Selection again = Select(templates, rule, &stepped);
   // A step is a large claim about one move: it has to be worth more than its price. The same holds
   // for a cause.

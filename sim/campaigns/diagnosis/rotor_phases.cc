@@ -40,9 +40,9 @@ struct Edge {
 std::vector<std::vector<Edge>> EdgesOf(const Fit& fit, std::size_t axis) {
   const CampaignFacts& facts = *fit.facts;
   const std::vector<double> errors = ErrorsOf(fit, axis);
-  std::vector<std::vector<Edge>> edges(facts.pulling.size());
+  std::vector<std::vector<Edge>> edges(facts.neighbours.size());
   for (std::size_t u = 0; u < edges.size(); ++u)
-    for (const std::size_t v : facts.pulling[u]) {
+    for (const std::size_t v : facts.neighbours[u]) {
       Complex sum = 0;
       for (const PullingPair& pair : PullOf(facts, u, v, axis))
         sum += pair.nearness * errors[pair.row] * std::polar(1.0, pair.angle_rad);

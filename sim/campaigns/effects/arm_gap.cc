@@ -26,12 +26,13 @@ Arm ArmOf(const CampaignUnit& unit, double theta_deg, double phi_deg) {
            elbow.y + unit.arm_mm[kPhi] * std::sin(second)}};
 }
 
-double Distance(Point p, const Arm& arm) {
+double SquaredDistance(Point p, const Arm& arm) {
   const double dx = arm.fibre.x - arm.elbow.x, dy = arm.fibre.y - arm.elbow.y;
   const double along =
       ((p.x - arm.elbow.x) * dx + (p.y - arm.elbow.y) * dy) / std::max(dx * dx + dy * dy, 1e-12);
   const double share = std::clamp(along, 0.0, 1.0);
-  return std::hypot(p.x - arm.elbow.x - share * dx, p.y - arm.elbow.y - share * dy);
+  const double off_x = p.x - arm.elbow.x - share * dx, off_y = p.y - arm.elbow.y - share * dy;
+  return off_x * off_x + off_y * off_y;
 }
 
 bool Cross(const Arm& a, const Arm& b) {
@@ -44,8 +45,8 @@ bool Cross(const Arm& a, const Arm& b) {
 
 double Gap(const Arm& a, const Arm& b) {
   if (Cross(a, b)) return 0;
-  return std::min(std::min(Distance(a.elbow, b), Distance(a.fibre, b)),
-                  std::min(Distance(b.elbow, a), Distance(b.fibre, a)));
+  return std::sqrt(std::min({SquaredDistance(a.elbow, b), SquaredDistance(a.fibre, b),
+                             SquaredDistance(b.elbow, a), SquaredDistance(b.fibre, a)}));
 }
 
 }  // namespace

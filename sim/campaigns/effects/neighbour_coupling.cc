@@ -35,8 +35,8 @@ void ApplyPhased(const UnitTrack& track, const Template& form, double amplitude,
   const std::size_t axis = AxisIndex(form);
   const CampaignFacts& facts = *track.facts;
   const std::optional<double> own = ShapeOf(form, track.unit->id);
-  if (!own || facts.pulling.empty()) return;
-  for (const std::size_t neighbour : facts.pulling[track.unit_index]) {
+  if (!own || facts.neighbours.empty()) return;
+  for (const std::size_t neighbour : facts.neighbours[track.unit_index]) {
     const auto other = ShapeOf(form, facts.campaign->units[neighbour].id);
     if (!other) continue;
     const double phase = kRadiansPerDegree * (*own - *other);

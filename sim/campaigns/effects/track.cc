@@ -24,21 +24,25 @@ double MedianOf(std::vector<double> values) {
   return *middle;
 }
 
-// Ranks are against at most kSamples of the values, which is fine enough for a smooth curve.
+// Ranks are against at most some kSamples of the values, which is fine enough for a smooth curve.
 void Rank(FilledColumn* column) {
   constexpr std::size_t kSamples = 2048;
-  const std::size_t stride = std::max<std::size_t>(1, column->values.size() / kSamples);
-  std::vector<double> sample;
-  for (std::size_t row = 0; row < column->values.size(); row += stride)
-    sample.push_back(column->values[row]);
-  std::sort(sample.begin(), sample.end());
-  column->rank.reserve(column->values.size());
-  for (const double value : column->values) {
-    const auto range = std::equal_range(sample.begin(), sample.end(), value);
-    const auto below = static_cast<double>(range.first - sample.begin());
-    const auto upto = static_cast<double>(range.second - sample.begin());
-    column->rank.push_back(
-        static_cast<float>((below + upto) / 2 / static_cast<double>(sample.size())));
+  const std::size_t rows = column->values.size();
+  const std::size_t stride = std::max<std::size_t>(1, rows / kSamples);
+  const auto samples = static_cast<double>((rows + stride - 1) / stride);
+  std::vector<std::pair<double, std::size_t>> ascending;
+  ascending.reserve(rows);
+  for (std::size_t row = 0; row < rows; ++row) ascending.emplace_back(column->values[row], row);
+  std::sort(ascending.begin(), ascending.end());
+  column->rank.resize(rows);
+  double below = 0;
+  for (std::size_t begin = 0, end = 0; begin < rows; begin = end) {
+    double upto = below;
+    for (; end < rows && ascending[end].first == ascending[begin].first; ++end)
+      if (ascending[end].second % stride == 0) upto += 1;
+    for (std::size_t k = begin; k < end; ++k)
+      column->rank[ascending[k].second] = static_cast<float>((below + upto) / 2 / samples);
+    below = upto;
   }
 }
 
@@ -110,12 +114,13 @@ void FindPlate(const Campaign& campaign, CampaignFacts* facts) {
   for (const CampaignUnit& unit : campaign.units) {
     facts->radius_mm = std::max(facts->radius_mm, std::hypot(unit.base_x_mm, unit.base_y_mm));
     if (campaign.units.size() < 2 || nearest.size() >= 200) continue;
-    double least_mm = std::numeric_limits<double>::infinity();
-    for (const CampaignUnit& other : campaign.units)
-      if (&other != &unit)
-        least_mm = std::min(least_mm, std::hypot(unit.base_x_mm - other.base_x_mm,
-                                                 unit.base_y_mm - other.base_y_mm));
-    nearest.push_back(least_mm);
+    double least_mm2 = std::numeric_limits<double>::infinity();
+    for (const CampaignUnit& other : campaign.units) {
+      const double dx_mm = unit.base_x_mm - other.base_x_mm;
+      const double dy_mm = unit.base_y_mm - other.base_y_mm;
+      if (&other != &unit) least_mm2 = std::min(least_mm2, dx_mm * dx_mm + dy_mm * dy_mm);
+    }
+    nearest.push_back(std::sqrt(least_mm2));
   }
   facts->pitch_mm = MedianOf(nearest);
 }
@@ -203,8 +208,8 @@ void FindGradients(const Campaign& campaign, CampaignFacts* facts) {
   facts->columns[std::string(kGradientY)] = Fill(gradient[1], campaign, facts->exposures);
 }
 
-// The first few units within reach of each unit, in the order of the table. The window along x
-// keeps the cost far below that of all pairs.
+// The first few units within reach of each unit that has rows, in the order of the table. The
+// window along x keeps the cost far below that of all pairs.
 std::vector<std::vector<std::size_t>> NeighboursOf(const Campaign& campaign, double reach_mm) {
   const std::vector<CampaignUnit>& units = campaign.units;
   std::vector<std::size_t> by_x(units.size());
@@ -213,6 +218,7 @@ std::vector<std::vector<std::size_t>> NeighboursOf(const Campaign& campaign, dou
   std::ranges::sort(by_x, {}, x_mm);
   std::vector<std::vector<std::size_t>> neighbours(units.size());
   for (std::size_t u = 0; u < units.size(); ++u) {
+    if (campaign.first_row[u] == campaign.first_row[u + 1]) continue;
     std::vector<std::size_t>& near = neighbours[u];
     for (auto at = std::ranges::lower_bound(by_x, x_mm(u) - reach_mm, {}, x_mm);
          at != by_x.end() && x_mm(*at) <= x_mm(u) + reach_mm; ++at) {
@@ -247,11 +253,10 @@ void AddModes(const Campaign& campaign, CampaignFacts* facts) {
 // motor's angle.
 void FindNeighbourPull(const Campaign& campaign, CampaignFacts* facts) {
   if (campaign.units.size() < 2) return;
-  facts->pulling = NeighboursOf(campaign, 1.3 * facts->pitch_mm);
   for (const auto& [axis, name] : {std::pair(kTheta, kNeighbourTheta), {kPhi, kNeighbourPhi}}) {
     std::vector<double> pull(campaign.rows());
     for (std::size_t u = 0; u < campaign.units.size(); ++u)
-      for (const std::size_t v : facts->pulling[u])
+      for (const std::size_t v : facts->neighbours[u])
         for (const PullingPair& pair : PullOf(*facts, u, v, axis))
           pull[pair.row] += pair.nearness * std::sin(pair.angle_rad);
     facts->columns[std::string(name)] = Fill(pull, campaign, facts->exposures);
@@ -260,8 +265,7 @@ void FindNeighbourPull(const Campaign& campaign, CampaignFacts* facts) {
 
 void FindContacts(const Campaign& campaign, CampaignFacts* facts) {
   if (campaign.units.size() < 2) return;
-  const ArmGaps gaps = FindArmGaps(campaign, facts->exposures,
-                                   NeighboursOf(campaign, 1.3 * facts->pitch_mm), facts->pitch_mm);
+  const ArmGaps gaps = FindArmGaps(campaign, facts->exposures, facts->neighbours, facts->pitch_mm);
   if (*std::min_element(gaps.gap_mm.begin(), gaps.gap_mm.end()) > kThickestArm * facts->pitch_mm)
     return;
   facts->columns[std::string(kArmGap)] = Fill(gaps.gap_mm, campaign, facts->exposures);
@@ -390,6 +394,7 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
     facts.columns[std::string(kStep[axis])] = Fill(facts.step_deg[axis], campaign, facts.exposures);
   }
   FindGradients(campaign, &facts);
+  if (campaign.units.size() > 1) facts.neighbours = NeighboursOf(campaign, 1.3 * facts.pitch_mm);
   FindNeighbourPull(campaign, &facts);
   FindContacts(campaign, &facts);
   FindRailLoads(campaign, &facts);

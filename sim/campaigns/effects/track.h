@@ -57,7 +57,7 @@ struct CampaignFacts {
   std::vector<char> closed;
   std::vector<double> step_deg[2];  // Shape: (rows): as commanded, wraps of whole turns undone
   // Shape: (units): indices of the units that are near enough for their motors to pull.
-  std::vector<std::vector<std::size_t>> pulling;
+  std::vector<std::vector<std::size_t>> neighbours;
   // Where rotors stand at motor angles of 0, deg, by unit_id, as the pull of their neighbours shows
   // it (diagnosis/rotor_phases.h). Empty where that is not known.
   std::map<std::uint32_t, double> rotor_phase_deg[2];
