@@ -16,7 +16,7 @@ constexpr double kWorthImproving = 1.2;
 /// Share of the time beyond which power takes the time, and rails are full.
 constexpr double kFullShare = 0.75;
 constexpr double kSlackMost = 2;  // times the bound that limits of power may take
-/// Work until all are clear of each other, for each unit of the plate: some fifteen times what 500
+/// Work until all are clear of each other, for each unit that goes: some fifteen times what 500
 /// take where nothing stands for good. Units: s of CPU.
 constexpr double kCompleteCost_s = 0.03;
 constexpr double kCompleteLeast_s = 10;  // of a few units, too: two may be hooked into each other
@@ -63,6 +63,12 @@ bool Planner::AbandonWalledIn() {
   return any;
 }
 
+std::size_t Planner::CountGoing() const {
+  std::size_t going = 0;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) going += service_.goes(i) ? 1u : 0u;
+  return going;
+}
+
 /// Plans all units at once. False: some units still meet others, and nothing is planned.
 bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   std::vector<std::uint8_t> may_move(service_.movable().begin(), service_.movable().end());
@@ -76,7 +82,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   double left_cpu_s =
       options_.power.any()
           ? std::numeric_limits<double>::infinity()
-          : std::max(kCompleteLeast_s, kCompleteCost_s * static_cast<double>(scene_.size()));
+          : std::max(kCompleteLeast_s, kCompleteCost_s * static_cast<double>(CountGoing()));
   for (int attempt = 0; attempt < kAttemptsMax && !IsAbandoned(options_.abandoned); ++attempt) {
     service_.DropCollidingTargets();
     scene_.AllowFor(start_);

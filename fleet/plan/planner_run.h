@@ -48,6 +48,7 @@ class Planner {
   [[nodiscard]] Status CheckWanted() const;
   [[nodiscard]] double MeanNeighbours() const;
   [[nodiscard]] LocalSearchResult Search(LocalSearchRequest search, double complete_cpu_s) const;
+  [[nodiscard]] std::size_t CountGoing() const;
   bool AllAtOnce(std::span<const AxisPaths> begin_with);
   bool LeaveStuck();
   void ServeTheRest();
