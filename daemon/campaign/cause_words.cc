@@ -64,6 +64,7 @@ constexpr CauseWords kWords[] = {
      "[have|has] a play that changes by {} as it warms"},
     {"tooth_damage", "damaged tooth", "[err|errs] by {} at one place of the turn"},
     {"tooth_mesh", "mesh of the teeth", "[ripple|ripples] by {} with each tooth of the gear"},
+    {"unknown", "something unknown", "[err|errs] by {}"},
     {"wear", "wear", "[change|changes] by {} with the turns [they have|it has] made"},
     {"zero_offset", "zero of an axis", "[have|has] a zero that is {} off"}};
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "daemon/campaign/verdict_sentence.h"
+#include "sim/campaigns/diagnosis/decide.h"
 #include "sim/campaigns/diagnosis/left_by.h"
 #include "sim/campaigns/effects/empirical.h"
 

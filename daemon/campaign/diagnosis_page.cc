@@ -9,6 +9,7 @@
 #include "daemon/campaign/diagnosis_figures.h"
 #include "daemon/campaign/verdict_sentence.h"
 #include "daemon/report/page.h"
+#include "sim/campaigns/diagnosis/decide.h"
 #include "sim/campaigns/diagnosis/next_moves.h"
 
 namespace focalfleet {

@@ -10,6 +10,7 @@
 #include "protocol/base/rng.h"
 #include "sim/campaigns/diagnosis/beaten.h"
 #include "sim/campaigns/diagnosis/chances.h"
+#include "sim/campaigns/diagnosis/decide.h"
 #include "sim/campaigns/diagnosis/diagnosis.h"
 #include "sim/campaigns/diagnosis/events.h"
 #include "sim/campaigns/diagnosis/exchanged.h"
@@ -209,18 +210,6 @@ void ReportClusters(const Fit& fit, std::vector<std::size_t> far, const Diagnose
   if (cluster) AddUnknown({std::move(cluster->reported)}, &diagnosis->unknown);
 }
 
-void Conclude(Diagnosis* diagnosis) {
-  bool ambiguous = false;
-  for (CauseFound& cause : diagnosis->causes) {
-    ambiguous = ambiguous || cause.candidates.size() > 1;
-    cause.doubt = DoubtOf(cause.cause, !diagnosis->unknown.empty());
-  }
-  diagnosis->verdict = !diagnosis->unknown.empty() ? Verdict::kUnknown
-                       : ambiguous                 ? Verdict::kAmbiguous
-                       : diagnosis->causes.empty() ? Verdict::kConsistent
-                                                   : Verdict::kExplained;
-}
-
 HeldOutGain GainOf(const Fit& fit, const std::optional<Campaign>& as_named,
                    const DiagnoseOptions& options) {
   if (!as_named) return MeasureGain(fit);
@@ -287,29 +276,6 @@ void LeaveOutImpossible(const Campaign& given, Diagnosis* diagnosis) {
 }
 
 }  // namespace
-
-double DoubtOf(std::string_view cause, bool beside_unknown) {
-  // Names without a rival in 288 campaigns of three generators (docs/diagnosis.md, Reliability).
-  struct Checked {
-    double wrong, names;
-    // The mean of Jeffreys' posterior of the share that is wrong.
-    [[nodiscard]] double rate() const { return (wrong + 0.5) / (names + 1); }
-  };
-  constexpr Checked kAlone{5, 192}, kBesideUnknown{9, 31};
-  if (TraitsOf(cause).is_static) return 0;  // no other cause is like it, and none was wrong
-  return beside_unknown ? kBesideUnknown.rate() : kAlone.rate();
-}
-
-std::vector<double> PosteriorOf(const CauseFound& cause) {
-  std::vector<double> weights;
-  for (const std::string& name : cause.candidates) {
-    const auto odds = cause.log_odds.find(name);
-    weights.push_back(odds == cause.log_odds.end() ? 1 : std::exp(odds->second));
-  }
-  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
-  for (double& weight : weights) weight *= (1 - cause.doubt) / sum;
-  return weights;
-}
 
 std::string_view Name(Verdict verdict) {
   switch (verdict) {
@@ -386,7 +352,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   LookAtRest(options, &fit, &diagnosis);
   ReportClusters(fit, FindAfterFit(fit, &diagnosis.outliers), options, &diagnosis);
   JudgeBesideUnknown(&diagnosis.causes, &diagnosis.unknown);
-  Conclude(&diagnosis);
+  Decide(&diagnosis);
   ProposeNextMoves(fit, as_named, options, &diagnosis);
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
   diagnosis.model = fit.model;

@@ -39,7 +39,7 @@ struct CauseFound {
   bool at_bound = false;  // the amplitude is as large as physics allows
   // Log odds of candidates against the cause, 0 where the data say nothing of it.
   std::map<std::string, double> log_odds;
-  double doubt = 0;    // probability that none of the candidates is the cause
+  double doubt = 0;    // probability that none of the names is the cause
   double size_um = 0;  // rms at the fibre
   double delta_log_likelihood = 0;
   // delta_log_likelihood of each unit, by unit id, in proportion to the squares of what the cause
@@ -49,13 +49,6 @@ struct CauseFound {
   std::string shape;      // of the template, in words
   std::string paragraph;  // for the operator
 };
-
-/// The probability that none of a cause's candidates is right, as measured on planted campaigns:
-/// 3 %, 30 % beside an unknown, and none for geometry.
-double DoubtOf(std::string_view cause, bool beside_unknown);
-
-/// The probability of each candidate; the rest of 1 is the cause's doubt. Shape: (candidates).
-std::vector<double> PosteriorOf(const CauseFound& cause);
 
 /// A cause by its name, which is its only candidate so far.
 inline CauseFound CauseNamed(std::string_view name) {
@@ -75,6 +68,7 @@ struct UnknownFound {
   double size_um = 0;
   double delta_log_likelihood = 0;  // of the structure, as if it were a cause
   std::optional<Patched> patched = std::nullopt;
+  bool casts_doubt = true;  // on names beside it: they may be parts of it
 };
 
 struct OutliersFound {

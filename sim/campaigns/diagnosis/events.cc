@@ -189,11 +189,12 @@ std::vector<UnknownFound> UnexplainedSteps(const Fit& fit) {
   if (AnyHasMet(fit)) return reported;
   for (const EventTerm& event : fit.model.events)
     if (KindOf(fit, event) == StepKind::kBlocked)
-      reported.push_back({"unit_id",
-                          "unit " + std::to_string(fit.model.units[event.unit].id) +
-                              " stands elsewhere since move " +
-                              std::to_string(fit.facts->campaign->move_id[event.row]),
-                          0, SizeOf_um(fit, event)});
+      reported.push_back({.covariate = "unit_id",
+                          .channel = "unit " + std::to_string(fit.model.units[event.unit].id) +
+                                     " stands elsewhere since move " +
+                                     std::to_string(fit.facts->campaign->move_id[event.row]),
+                          .size_um = SizeOf_um(fit, event),
+                          .casts_doubt = false});
   return reported;
 }
 

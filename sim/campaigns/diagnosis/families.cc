@@ -340,8 +340,11 @@ void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unk
     for (CauseFound* one : members)
       for (const CauseFound* other : members)
         if (other != one) add(*other, one);
-    unknown->push_back(
-        {std::string(axis) + "_cmd_deg", std::string(axis) + " angle", 0, std::sqrt(square)});
+    // The members have each other as candidates, which is all that the series says.
+    unknown->push_back({.covariate = std::string(axis) + "_cmd_deg",
+                        .channel = std::string(axis) + " angle",
+                        .size_um = std::sqrt(square),
+                        .casts_doubt = false});
   }
 }
 

@@ -9,6 +9,7 @@
 #include <set>
 #include <string_view>
 
+#include "sim/campaigns/diagnosis/decide.h"
 #include "sim/campaigns/diagnosis/evidence.h"
 #include "sim/campaigns/diagnosis/families.h"
 #include "sim/campaigns/diagnosis/score.h"
@@ -423,6 +424,7 @@ NextMoves ProposeMoves(const Fit& fit, const std::vector<CauseFound>& causes) {
     if (cause.candidates.size() < 2) continue;
     const std::optional<std::size_t> term = TermOf(fit, cause);
     for (std::size_t k = 1; k < cause.candidates.size(); ++k) {
+      if (cause.candidates[k] == kSomethingUnknown) continue;
       if (!term || pairs.size() == kPairsMax || FindEffect(cause.candidates[k]) == nullptr)
         none.inseparable.push_back({cause.cause, cause.candidates[k]});
       else

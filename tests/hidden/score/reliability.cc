@@ -23,11 +23,16 @@ Reliability ReliabilityOf(const std::vector<Case>& cases) {
   for (const Case& c : cases)
     for (const NamedCause& named : c.named) {
       if (IsStatic(named.cause)) continue;
+      const auto is_true = [&](const std::string& name) {
+        return c.also_true.count(name) != 0 || c.IsTrue(name);
+      };
       for (const auto& [cause, probability] : named.posterior) {
         const double at = std::clamp(probability * 10, 0.0, 9.0);
         ReliabilityBin& bin = bins[static_cast<std::size_t>(at)];
         ++bin.count;
-        bin.right += c.also_true.count(cause) != 0 || c.IsTrue(cause) ? 1 : 0;
+        const bool right =
+            cause == "unknown" ? std::ranges::none_of(named.candidates, is_true) : is_true(cause);
+        bin.right += right ? 1 : 0;
         bin.stated_sum += probability;
       }
     }

@@ -1,6 +1,7 @@
 // Reliability compares the probabilities that reports state with how often they are right. Each
 // candidate of each named cause counts by its own probability, in ten bins; static geometry, which
-// has no rivals, does not count. A report is calibrated where the share that is right is the mean
+// has no rivals, does not count. The candidate "unknown" is right where no other of the cause is.
+// A report is calibrated where the share that is right is the mean
 // of what was stated.
 #pragma once
 

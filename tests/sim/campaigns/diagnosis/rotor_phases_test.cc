@@ -35,7 +35,7 @@ Campaign Pulled(const std::vector<double>& phases_deg, std::uint64_t seed) {
   const CampaignFacts facts = MakeFacts(campaign);
   std::vector<double> off_deg(campaign.rows(), 0);
   for (std::size_t u = 0; u < phases_deg.size(); ++u)
-    for (const std::size_t v : facts.pulling[u])
+    for (const std::size_t v : facts.neighbours[u])
       for (const PullingPair& pair : PullOf(facts, u, v, kTheta))
         off_deg[pair.row] +=
             kPull_deg * pair.nearness *
@@ -55,7 +55,7 @@ TEST(RotorPhases, AreFoundButForWhatAllHaveInCommon) {
   const auto found_deg = FindRotorPhases(StaticFit(facts), kTheta);
   ASSERT_EQ(found_deg.size(), phases_deg.size());
   for (std::size_t u = 0; u < phases_deg.size(); ++u)
-    for (const std::size_t v : facts.pulling[u])
+    for (const std::size_t v : facts.neighbours[u])
       EXPECT_LT(Apart_deg(found_deg.at(campaign.units[u].id) - found_deg.at(campaign.units[v].id),
                           phases_deg[u] - phases_deg[v]),
                 45)  // at 60 moves; any angle up to 180 were chance

@@ -1,0 +1,67 @@
+#include "sim/campaigns/diagnosis/decide.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "sim/campaigns/effects/other_causes.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// The least probability of a name by itself is 1 less this. Half and double of it:
+// docs/diagnosis.md, Reliability.
+constexpr double kDoubtMax = 0.1;
+
+// The share of a structure's size in all that it and the name explain. Two errors of one size are
+// even odds: the name may be a part of the structure.
+double DoubtBeside(const CauseFound& cause, std::span<const UnknownFound> unknown) {
+  double square_um2 = 0;
+  for (const UnknownFound& one : unknown)
+    if (one.casts_doubt) square_um2 += one.size_um * one.size_um;
+  if (!(square_um2 > 0)) return 0;
+  const double unknown_um = std::sqrt(square_um2);
+  return unknown_um / (unknown_um + cause.size_um);
+}
+
+Verdict VerdictOf(const Diagnosis& diagnosis) {
+  const auto is_ambiguous = [](const CauseFound& cause) { return cause.candidates.size() > 1; };
+  if (!diagnosis.unknown.empty()) return Verdict::kUnknown;
+  if (std::ranges::any_of(diagnosis.causes, is_ambiguous)) return Verdict::kAmbiguous;
+  return diagnosis.causes.empty() ? Verdict::kConsistent : Verdict::kExplained;
+}
+
+}  // namespace
+
+double DoubtOf(const CauseFound& cause, std::span<const UnknownFound> unknown) {
+  // Names without a rival where nothing was unknown, in 288 campaigns of three generators.
+  constexpr double kWrong = 5, kNames = 192;
+  constexpr double kAlone = (kWrong + 0.5) / (kNames + 1);  // the mean of Jeffreys' posterior
+  if (TraitsOf(cause.cause).is_static) return 0;  // no other cause is like it, and none was wrong
+  return 1 - (1 - kAlone) * (1 - DoubtBeside(cause, unknown));
+}
+
+std::vector<double> PosteriorOf(const CauseFound& cause) {
+  std::vector<double> weights;
+  for (const std::string& name : cause.candidates) {
+    const auto odds = cause.log_odds.find(name);
+    weights.push_back(name == kSomethingUnknown      ? 0
+                      : odds == cause.log_odds.end() ? 1
+                                                     : std::exp(odds->second));
+  }
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    weights[k] = cause.candidates[k] == kSomethingUnknown ? cause.doubt
+                                                          : weights[k] * (1 - cause.doubt) / sum;
+  return weights;
+}
+
+void Decide(Diagnosis* diagnosis) {
+  for (CauseFound& cause : diagnosis->causes) {
+    cause.doubt = DoubtOf(cause, diagnosis->unknown);
+    if (cause.doubt > kDoubtMax) cause.candidates.emplace_back(kSomethingUnknown);
+  }
+  diagnosis->verdict = VerdictOf(*diagnosis);
+}
+
+}  // namespace focalfleet::sim
