@@ -25,6 +25,7 @@
 #include "sim/campaigns/diagnosis/patch.h"
 #include "sim/campaigns/diagnosis/plain_geometry.h"
 #include "sim/campaigns/diagnosis/polished.h"
+#include "sim/campaigns/diagnosis/pushed_apart.h"
 #include "sim/campaigns/diagnosis/remarks.h"
 #include "sim/campaigns/diagnosis/rotor_phases.h"
 #include "sim/campaigns/diagnosis/rotors.h"
@@ -187,24 +188,42 @@ void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const Para
   }
 }
 
-// Clusters of far rows are contacts of arms where these are nearest, and else unknown.
+// Names a contact of arms for these rows, which are far no more then.
+void ReportContact(const Fit& fit, const std::vector<std::size_t>& rows,
+                   std::vector<std::size_t>* far, std::vector<CauseFound>* causes) {
+  CauseFound touch = TouchCause(fit, rows);
+  const auto reported = std::ranges::find(*causes, kContact, &CauseFound::cause);
+  if (reported != causes->end()) {
+    AddUnits(touch, &*reported);
+  } else {
+    const auto weaker = std::ranges::find_if(*causes, [&](const CauseFound& cause) {
+      return cause.delta_log_likelihood < touch.delta_log_likelihood;
+    });
+    causes->insert(weaker, std::move(touch));
+  }
+  const std::set<std::size_t> touched(rows.begin(), rows.end());
+  std::erase_if(*far, [&](std::size_t row) { return touched.count(row) != 0; });
+}
+
+// Far rows are contacts of arms where neighbours were pushed apart, or where arms are nearest.
+// Other clusters of them are unknown.
 void ReportClusters(const Fit& fit, std::vector<std::size_t> far, const DiagnoseOptions& options,
                     Diagnosis* diagnosis) {
-  const auto is_contact = [](const CauseFound& cause) { return cause.cause == kContact; };
+  const bool may_touch = !IsLeftOut(options, kContact);
+  if (const auto pushed = FindPushedApart(fit, far, options.family_wise)) {
+    if (may_touch)
+      ReportContact(fit, pushed->rows, &far, &diagnosis->causes);
+    else
+      AddUnknown({{.covariate = std::string(kArmGap),
+                   .channel = "neighbours pushed apart",
+                   .p_value = std::exp(pushed->log_p),
+                   .size_um = pushed->size_um,
+                   .delta_log_likelihood = -pushed->log_p}},
+                 &diagnosis->unknown);
+  }
   auto cluster = FindCluster(fit, far, options.family_wise);
-  if (cluster && !cluster->touched.empty() && !IsLeftOut(options, kContact)) {
-    CauseFound touch = TouchCause(fit, cluster->touched);
-    std::vector<CauseFound>& causes = diagnosis->causes;
-    if (const auto reported = std::ranges::find_if(causes, is_contact); reported != causes.end()) {
-      AddUnits(touch, &*reported);
-    } else {
-      const auto weaker = std::ranges::find_if(causes, [&](const CauseFound& cause) {
-        return cause.delta_log_likelihood < touch.delta_log_likelihood;
-      });
-      causes.insert(weaker, std::move(touch));
-    }
-    const std::set<std::size_t> touched(cluster->touched.begin(), cluster->touched.end());
-    std::erase_if(far, [&](std::size_t row) { return touched.count(row) != 0; });
+  if (cluster && !cluster->touched.empty() && may_touch) {
+    ReportContact(fit, cluster->touched, &far, &diagnosis->causes);
     cluster = FindCluster(fit, far, options.family_wise);
   }
   if (cluster) AddUnknown({std::move(cluster->reported)}, &diagnosis->unknown);

@@ -47,7 +47,7 @@ TEST(Decide, ANameThatMayBePartOfAStructureHasUnknownAsACandidate) {
   const Diagnosis diagnosis = Found({NameOf(50), NameOf(2)}, {{.size_um = 2}});
   EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown);
   EXPECT_THAT(diagnosis.causes[0].candidates, ElementsAre("backlash"));
-  EXPECT_THAT(diagnosis.causes[1].candidates, ElementsAre("backlash", "unknown"));
+  ASSERT_THAT(diagnosis.causes[1].candidates, ElementsAre("backlash", "unknown"));
   const std::vector<double> posterior = PosteriorOf(diagnosis.causes[1]);
   EXPECT_NEAR(posterior[0], (1 - kAlone) / 2, 1e-12);
   EXPECT_NEAR(posterior[0] + posterior[1], 1, 1e-12);
