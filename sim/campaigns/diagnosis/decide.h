@@ -1,6 +1,6 @@
 // The decision: each name gets its probability, and a verdict follows. The data share a probability
-// out among the candidates that they do not separate. What remains is the doubt that none of them
-// is the cause. It was counted on planted campaigns, and grows with what is unknown beside the
+// out among the candidates that they do not separate. The rest is the doubt that none of them is
+// the cause. This doubt was counted on planted campaigns, and grows with what is unknown beside the
 // name. A name that is not nearly certain has "unknown" among its candidates.
 #pragma once
 

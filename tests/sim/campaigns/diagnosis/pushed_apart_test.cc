@@ -24,7 +24,7 @@ struct Near {
 };
 
 // The campaign in which the fibres that come nearest push each other apart: three pairs of units,
-// each in one exposure. So few far rows are no cluster of them.
+// each in one exposure. These far rows are too few for a cluster.
 Campaign PushApart(std::uint64_t seed) {
   constexpr std::size_t kMoves = 70;
   constexpr double kPush_mm = 0.15;
