@@ -15,16 +15,29 @@ double NegativeBicWith(Fit fit, const Noise& noise) {
   return NegativeBic(fit);
 }
 
+// The fit with these steps beside its terms.
+Fit WithEvents(const Fit& fit, const std::vector<EventTerm>& events) {
+  constexpr int kRounds = 3;
+  Fit with = fit;
+  with.model.events = events;
+  UpdateResiduals(&with);
+  StepFit(&with);
+  SettleFit(&with, kRounds);
+  return with;
+}
+
 // Selects with and without steps in single units' angles, and takes the better fit for its price.
 Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Fit stepped = *fit;
   const bool has_events = AddEvents(rule.family_wise, &stepped) > 0;
   Selection selection = Select(templates, rule, fit);
   if (!has_events) return selection;
-  // The effect of a cause on a few moves looks like steps until the cause is known. Steps that the
-  // rest does not pay for then are no reason for another search.
+  // The effect of a cause on a few moves looks like steps until the cause is known.
   Fit explained = *fit;
-  if (AddEvents(rule.family_wise, &explained) == 0 || BetterBy(explained, *fit) <= 0)
+  if (AddEvents(rule.family_wise, &explained) == 0) return selection;
+  // Steps that do not pay for themselves beside the found terms, neither those found before nor
+  // those found after, are no reason for another search.
+  if (BetterBy(explained, *fit) <= 0 && BetterBy(WithEvents(*fit, stepped.model.events), *fit) <= 0)
     return selection;
   Selection again = Select(templates, rule, &stepped);
   // A step is a large claim about one move: it has to be worth more than its price. The same holds

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <set>
@@ -12,8 +13,10 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kShare = 0.3;     // of the family-wise rate, as other searches of the rest have
-constexpr double kOnePair = 0.05;  // chance of a pair whose rows are reported with the others
+constexpr double kShare = 0.3;  // of the family-wise rate, as other searches of the rest have
+// The chance of the directions alone, below which they say so, too: nearness alone is no push. Also
+// of a pair whose rows are reported with the others.
+constexpr double kChanceMax = 0.05;
 constexpr std::size_t kNoRow = SIZE_MAX;
 
 // Two neighbours in one exposure.
@@ -99,22 +102,31 @@ std::optional<PushedApart> FindPushedApart(const Fit& fit, const std::vector<std
   const std::vector<NeighbourPair> pairs = NeighboursAmong(fit, far);
   if (pairs.empty()) return std::nullopt;
   const std::vector<double> all_mm = DistancesOf_mm(fit);
-  std::map<std::pair<std::size_t, std::size_t>, double> of_units;  // the likeliest of their rows
+  // The likeliest of two units' rows: ln of the chance of directions and distance, and of
+  // directions.
+  struct Likeliest {
+    double both = -std::numeric_limits<double>::infinity();
+    double directions = both;
+  };
+  std::map<std::pair<std::size_t, std::size_t>, Likeliest> of_units;
   std::set<std::size_t> rows;
   for (const NeighbourPair& two : pairs) {
     const auto as_near = std::ranges::upper_bound(all_mm, DistanceOf_mm(fit, two)) - all_mm.begin();
-    const double log_p =
-        LogCombined(LogChanceOfDirection(fit, two, 0) + LogChanceOfDirection(fit, two, 1) +
-                        std::log(static_cast<double>(as_near) / static_cast<double>(all_mm.size())),
-                    3);
-    const auto [at, fresh] = of_units.try_emplace({two.unit[0], two.unit[1]}, log_p);
-    if (!fresh) at->second = std::max(at->second, log_p);
-    if (log_p < std::log(kOnePair)) rows.insert({two.row[0], two.row[1]});
+    const double share = static_cast<double>(as_near) / static_cast<double>(all_mm.size());
+    const double directions = LogChanceOfDirection(fit, two, 0) + LogChanceOfDirection(fit, two, 1);
+    const double both = LogCombined(directions + std::log(share), 3);
+    Likeliest& most = of_units[{two.unit[0], two.unit[1]}];
+    most.both = std::max(most.both, both);
+    most.directions = std::max(most.directions, LogCombined(directions, 2));
+    if (both < std::log(kChanceMax)) rows.insert({two.row[0], two.row[1]});
   }
-  double sum = 0;
-  for (const auto& [units, log_p] : of_units) sum += log_p;
-  const double log_p = LogCombined(sum, of_units.size());
-  if (rows.empty() || log_p > std::log(kShare * family_wise)) return std::nullopt;
+  Likeliest sum{0, 0};
+  for (const auto& [units, most] : of_units)
+    sum.both += most.both, sum.directions += most.directions;
+  const double log_p = LogCombined(sum.both, of_units.size());
+  if (rows.empty() || log_p > std::log(kShare * family_wise) ||
+      LogCombined(sum.directions, of_units.size()) > std::log(kChanceMax))
+    return std::nullopt;
   PushedApart found{.rows = {rows.begin(), rows.end()}, .log_p = log_p};
   for (const std::size_t row : found.rows)
     found.size_um += fit.x_um[row] * fit.x_um[row] + fit.y_um[row] * fit.y_um[row];
