@@ -154,7 +154,7 @@ UnitTruth World::Truth(std::size_t row) const {
   truth.powered = unit.firmware().powered();
   truth.interrupted = unit.firmware().interrupted();
   truth.moves_begun = unit.flash().moves_begun;
-  truth.last_move = unit.flash().last_begun;
+  truth.last_move = unit.last_begun();
   truth.begun_twice = unit.begun_twice();
   truth.began = unit.began();
   truth.clock_error = unit.traits().clock.rate - 1;

@@ -93,6 +93,10 @@ TEST(Regression, Seed42_AUnitThatCountsFromElsewhereDoesNotBegin) { ExpectKept(4
 // showed a foreign unit at the place of the unit that it had replaced.
 TEST(Regression, Seed9_ANumberOfAPlanThatIsOverIsNoPlan) { ExpectKept(9); }
 
+// A unit lost its FLASH in the instant after it had begun a move, and the judge read the move
+// there.
+TEST(Regression, Seed556_TheMoveThatBeganIsNotReadInALostFlash) { ExpectKept(556); }
+
 // The judge's own parts must be able to see what they look for.
 
 StoreOptions On(const MemoryDisk& disk) { return {.vfs = disk.name(), .vfs_has_files = true}; }

@@ -24,7 +24,8 @@ Unit::Unit(const Parts& parts)
                  {&axis_[0], &axis_[1]},
                  &faults_,
                  JointOf(parts, traits_.mechanism)}),
-      recorded_(flash_.moves_begun) {
+      recorded_(flash_.moves_begun),
+      last_begun_(flash_.last_begun) {
   if (flash_.last_begun.value != 0) begun_.push_back(flash_.last_begun.value);
 }
 
@@ -57,6 +58,7 @@ void Unit::RecordBegun(HostInstant now) {
   if (recorded_ == flash_.moves_begun) return;
   recorded_ = flash_.moves_begun;
   began_ = now;
+  last_begun_ = flash_.last_begun;
   if (begun_.size() >= kBegunMax) begun_.clear();
   const std::uint16_t move = flash_.last_begun.value;
   const auto at = std::lower_bound(begun_.begin(), begun_.end(), move);

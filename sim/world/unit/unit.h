@@ -39,6 +39,8 @@ class Unit {
   [[nodiscard]] UnitFaults& faults() { return faults_; }
   [[nodiscard]] const UnitFaults& faults() const { return faults_; }
   [[nodiscard]] std::uint32_t begun_twice() const { return begun_twice_; }
+  /// The move that it began last, whatever its FLASH says since; 0: none yet.
+  [[nodiscard]] MoveId last_begun() const { return last_begun_; }
   /// The begin of its last motion; kNever: none in this run.
   [[nodiscard]] HostInstant began() const { return began_; }
 
@@ -53,6 +55,7 @@ class Unit {
   std::uint32_t recorded_ = 0;        // the part of flash_.moves_begun that is in begun_
   std::vector<std::uint16_t> begun_;  // sorted
   std::uint32_t begun_twice_ = 0;
+  MoveId last_begun_;
   HostInstant began_ = kNever;
 };
 
