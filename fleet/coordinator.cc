@@ -46,6 +46,8 @@ class Coordinator::Impl {
     for (const PlanDone& plan : inputs.plans) executor_.OnPlan(plan);
     for (const ExposureDone& exposure : inputs.exposures) executor_.OnExposure(exposure);
     for (const Command& command : inputs.commands) Obey(command);
+    if (inputs.committed_through > stored_through_) WakeStored(fleet_);
+    stored_through_ = inputs.committed_through;
     while (const auto due = timers_.TakeDue(step_.now)) sessions_.Service(*due);
     executor_.Advance();
     effects->wake_at = std::min(effects->wake_at, executor_.due());
@@ -199,7 +201,8 @@ class Coordinator::Impl {
   Ledger ledger_;
   Requests requests_;
   BusTraffic traffic_;
-  const Coordination fleet_;  // of the members above
+  const Coordination fleet_;          // of the members above
+  std::uint64_t stored_through_ = 0;  // at the last step
   UnitSessions sessions_;
   ConfigurationExecutor executor_;
 };

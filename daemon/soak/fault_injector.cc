@@ -1,5 +1,7 @@
 #include "daemon/soak/fault_injector.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -141,7 +143,12 @@ void FaultInjector::Begin(FaultSite site) {
     default:
       break;
   }
-  if (BeginOnBus(site) || BeginOnUnit(site)) Count(site);
+  auto begun = BeginOnBus(site);
+  if (!begun) begun = BeginOnUnit(site);
+  if (!begun) return;
+  Count(site);
+  parts_.tell(fmt::format("{} on {}, {:.1f} s", Name(site), begun->on,
+                          1e-9 * static_cast<double>((begun->until - now_).ns)));
 }
 
 /// A frame that no host of ours sent, or that no unit sent.
@@ -167,7 +174,7 @@ void FaultInjector::Hear(bool garbage) {
   parts_.plant->world().Inject(unit.bus, frame, now_, 1);
 }
 
-bool FaultInjector::BeginOnBus(FaultSite site) {
+std::optional<FaultInjector::Begun> FaultInjector::BeginOnBus(FaultSite site) {
   auto disturb = parts_.plant->world().disturb();
   const auto buses = parts_.plant->layout().buses();
   const std::size_t index = rng_.Below(buses.size());
@@ -211,7 +218,7 @@ bool FaultInjector::BeginOnBus(FaultSite site) {
         Until(end, [this, each] { parts_.plant->world().disturb().ReviveBus(each); });
         touch(which, end);
       }
-      return true;
+      return Begun{"all buses", end};
     case kBusStuck:
       disturb.StickBus(bus);
       Until(end, [this, bus] { parts_.plant->world().disturb().ReleaseBus(bus); });
@@ -227,18 +234,19 @@ bool FaultInjector::BeginOnBus(FaultSite site) {
           now_, 1);
       break;
     default:
-      return false;
+      return std::nullopt;
   }
   touch(index, end);
-  return true;
+  return Begun{fmt::format("bus {}", bus.value), end};
 }
 
-bool FaultInjector::BeginOnUnit(FaultSite site) {
+std::optional<FaultInjector::Begun> FaultInjector::BeginOnUnit(FaultSite site) {
   auto disturb = parts_.plant->world().disturb();
   const auto& units = parts_.plant->layout().units();
   const std::size_t row = rng_.Below(units.size());
   const UnitId unit = units[row].id;
   const HostInstant end = Lasts();
+  const Begun begun{fmt::format("unit {}", unit.value), end};
   const auto power_cut = [&](std::size_t which) {
     const UnitId each = units[which].id;
     disturb.PowerCut(each);
@@ -252,20 +260,20 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
   switch (site) {
     case kUnitPowerCut:
       power_cut(row);
-      return true;
+      return begun;
     case kRailPowerCut:
       for (std::size_t which = 0; which < units.size(); ++which)
         if (units[which].rail == units[row].rail) power_cut(which);
-      return true;
+      return begun;
     case kUnitFault:
       disturb.RaiseFault(unit, static_cast<FaultCode>(1 + rng_.Below(5)),
                          rng_.Below(2) == 0 ? Axis::kTheta : Axis::kPhi);
-      return true;
+      return begun;
     case kUnitUnplugged:
       disturb.Unplug(unit);
       deaf(row);
       Until(end, [this, unit] { parts_.plant->world().disturb().Plug(unit); });
-      return true;
+      return begun;
     case kUnitBabbles: {
       // A babbler takes its whole bus.
       CanFrame frame{};
@@ -276,7 +284,7 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
       const auto bus = std::lower_bound(buses.begin(), buses.end(), units[row].bus) - buses.begin();
       Troubles::Until(end + Seconds(3), &parts_.troubles->buses[static_cast<std::size_t>(bus)]);
       Until(end, [this, unit] { parts_.plant->world().disturb().Babble(unit, std::nullopt); });
-      return true;
+      return begun;
     }
     case kUnitFlashLost:
     case kUnitMarkLost:
@@ -286,7 +294,7 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
         parts_.troubles->counts_lost[row] = now_;
       disturb.SpoilFlash(
           unit, site == kUnitFlashLost ? sim::FlashDamage::kOldCounts : sim::FlashDamage::kNoMark);
-      return true;
+      return begun;
     case kUnitIntermittent:
       for (int part = 0; part < 8; ++part) {
         const HostInstant at = now_ + Milliseconds(300 * part);
@@ -294,13 +302,13 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
           parts_.plant->world().disturb().faults(unit)->silent = !healed_ && part % 2 == 0;
         });
       }
-      return true;
+      return begun;
     default:
       break;
   }
   sim::UnitFaults* faults = disturb.faults(unit);
   if (site == kUnitDeaf || site == kUnitIgnores) deaf(row);
-  if (site < kUnitSilent || site > kUnitSerialZero) return false;
+  if (site < kUnitSilent || site > kUnitSerialZero) return std::nullopt;
   BeginWrongAnswers(site, unit);
   // Hardware is exchanged while it has no power.
   const bool exchanged = site == kUnitForeign || site == kUnitSerialZero;
@@ -315,7 +323,7 @@ bool FaultInjector::BeginOnUnit(FaultSite site) {
     *faults = {};
     power_cycle();
   });
-  return true;
+  return begun;
 }
 
 void FaultInjector::BeginWrongAnswers(FaultSite site, UnitId unit) {

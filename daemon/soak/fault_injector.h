@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <queue>
+#include <string>
 #include <vector>
 
 #include "daemon/soak/draws.h"
@@ -27,6 +28,8 @@ class FaultInjector {
     FaultCounts* reached = nullptr;
     /// Done by the host itself at a fault of it.
     std::function<void(FaultSite)> host;
+    /// Gets a line for each fault that goes by time.
+    std::function<void(const std::string&)> tell;
   };
   FaultInjector(const Parts& parts, HostInstant now);
 
@@ -56,9 +59,14 @@ class FaultInjector {
       return std::pair(at, number) > std::pair(other.at, other.number);
     }
   };
+  /// A fault on a bus or a unit: what it touches, and until when.
+  struct Begun {
+    std::string on;
+    HostInstant until;
+  };
   void Begin(FaultSite site);
-  bool BeginOnBus(FaultSite site);
-  bool BeginOnUnit(FaultSite site);
+  std::optional<Begun> BeginOnBus(FaultSite site);
+  std::optional<Begun> BeginOnUnit(FaultSite site);
   void BeginWrongAnswers(FaultSite site, UnitId unit);
   void Until(HostInstant at, std::function<void()> undo);
   void Count(FaultSite site) { ++(*parts_.reached)[Index(site)]; }

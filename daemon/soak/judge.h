@@ -7,15 +7,14 @@
 //              or the order to home, was given to a bus; and the stored place was exact, unless it
 //              homes.
 //   place      A stored exact place is where the unit is. An open intent or an interval holds it.
-//   durable    What was acknowledged as committed is there after every kill and power cut, and
-//              nothing that was not offered is there.
 //   reported   A place reported to readers is one that the store has acknowledged.
 //   contact    No two arms touch, unless a fault kept every stop from one of them.
 //   stop       Within a bound after a stop was ordered, no reachable unit moves.
 //   twice      No move is begun twice.
 //   bound      Queues stay within their bounds.
 //
-// Motion has a judge of its own (motion_judge.h): starts of one move apart, followers, power.
+// The store and motion have judges of their own (store_judge.h, motion_judge.h): what survives a
+// kill; starts of one move apart, followers, power.
 #pragma once
 
 #include <array>
@@ -33,7 +32,7 @@
 #include "daemon/soak/draws.h"
 #include "daemon/soak/motion_judge.h"
 #include "daemon/soak/plant.h"
-#include "daemon/soak/stored_picture.h"
+#include "daemon/soak/store_judge.h"
 #include "daemon/soak/troubles.h"
 #include "daemon/status/shell_facts.h"
 #include "daemon/status/status_batch.h"
@@ -50,15 +49,16 @@ class Judge {
 
   // ---- what it sees
 
-  void Commits(std::span<const Row> rows);
+  void Commits(std::span<const Row> rows) { store_.Commits(rows); }
   void Committed(std::span<const Row> rows, bool done);
   void Published(const StatusBatch& status);
   void Sends(BusId bus, const CanFrame& frame);
   /// Looks at the true state; call it ten times a second or more often.
   void Look(HostInstant now);
   void StopOrdered(HostInstant now, std::optional<UnitId> unit);
-  /// A process starts on this disk: what it reads is judged.
-  void LifeBegins();
+  /// The store judge's.
+  void LifeBegins() { store_.LifeBegins(); }
+  void LifeHasBegun();
   /// The state of the queues of a life.
   void Queues(std::size_t batches, std::span<const ShellFacts::Bus> buses);
   /// An operator takes the risk of contact from here on.
@@ -66,8 +66,11 @@ class Judge {
 
   void Broken(const std::string& rule, const std::string& what);
   [[nodiscard]] const std::vector<std::string>& broken() const { return broken_; }
+  [[nodiscard]] std::size_t IntentsOpen() const { return store_.IntentsOpen(); }
   /// The fleet as last acknowledged by the store.
-  [[nodiscard]] const StoredPicture& acknowledged() const { return shadow_; }
+  [[nodiscard]] const StoredPicture& acknowledged() const { return store_.acknowledged(); }
+  /// Units whose arms touch, ascending.
+  [[nodiscard]] std::vector<std::uint32_t> TouchingUnits() const;
   /// Distance of a unit from its stored exact place. Units: vectors; none: no such place.
   [[nodiscard]] std::optional<double> OffPlace(std::size_t row) const;
 
@@ -77,25 +80,19 @@ class Judge {
     std::uint32_t begun_twice = 0;
     HostInstant must_rest = kNever;  // after a stop
   };
-  static void Apply(std::span<const Row> rows, StoredPicture* picture);
-  const StoredPicture* Durable();
   void LookAtStarts(std::size_t row, const sim::UnitTruth& truth);
   void LookAtPlace(std::size_t row, const sim::UnitTruth& truth);
+  void LookAtFibre(std::size_t row, const sim::UnitTruth& truth, const StoredPlace& place);
   void LookAtStop(std::size_t row, const sim::UnitTruth& truth);
   void LookForContact(std::span<const sim::UnitTruth> truths);
   void NoteBlind(std::span<const Row> rows);
   [[nodiscard]] std::size_t BusOf(std::size_t row) const;
 
   const Plant* plant_;
-  const MemoryDisk* disk_;
   const Troubles* troubles_;
   double slack_vectors_ = 0;
   HostInstant now_{0};
-  PictureReader reader_;
-  std::optional<StoredPicture> durable_;
-  std::uint64_t durable_syncs_ = UINT64_MAX;
-  StoredPicture shadow_;                    // acknowledged
-  std::optional<StoredPicture> in_flight_;  // with the batch that is being committed
+  StoreJudge store_;
   struct Stored {
     HostInstant first;
     HostInstant last;

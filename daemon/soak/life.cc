@@ -14,10 +14,10 @@ namespace focalfleet::soak {
 namespace {
 
 constexpr const char* kStorePath = "store.sqlite";
-/// Looks of a search after which it counts as one without end. A plan takes one to two looks a
-/// unit.
+/// Looks of a search after which it counts as one without end, of 1 ms or so each. A plan takes one
+/// to two looks a unit, and up to 300 in all where its targets are hard to come by.
 int PlanLooksMax(std::size_t units, bool limited) {
-  const int most = units <= 100 ? 100 : static_cast<int>(units) * 4;
+  const int most = units <= 75 ? 300 : static_cast<int>(units) * 4;
   return limited ? 10 * most : most;  // units look for a start again and again
 }
 
@@ -91,7 +91,7 @@ StoreWriter::Sinks Life::MakeSinks() {
     around_.published(*status);
     return true;
   };
-  sinks.alarm = [](const AlarmValue&) {};
+  sinks.alarm = [this](const AlarmValue& alarm) { around_.log(alarm.row.text); };
   sinks.log_error = around_.log;
   sinks.log_info = around_.log;
   sinks.monotonic_ns = &ReadVirtualNs;

@@ -169,9 +169,12 @@ void MotionJudge::LookAtFollowers(HostInstant now, std::span<const sim::UnitTrut
                                   std::span<const std::vector<std::size_t>> near) {
   const auto look = [&](std::size_t first, std::size_t follower) {
     const Course& halted = courses_[first];
-    if (halted.over || halted.halted == kNever || now < halted.halted + kFollowersStopWithin)
-      return;
     const Course& going = courses_[follower];
+    // A follower that began later was planned with the first unit's next move, and that unit's not
+    // beginning it is noticed as late as an end.
+    if (halted.over || halted.halted == kNever ||
+        now < std::max(halted.halted, going.began) + kFollowersStopWithin)
+      return;
     const bool goes = !going.over && going.halted == kNever && truths[follower].powered &&
                       truths[follower].state == UnitState::kMoving;
     if (!goes || IsExcused(follower, halted.halted - kAfterFault) ||

@@ -50,7 +50,8 @@ Night::Night(const Draws& draws, const NightOptions& options)
                            .disk = disk_.get(),
                            .troubles = &troubles_,
                            .reached = &reached_,
-                           .host = [this](FaultSite site) { OfHost(site); }},
+                           .host = [this](FaultSite site) { OfHost(site); },
+                           .tell = [this](const std::string& what) { Tell(what); }},
       now_);
   operators_ = std::make_unique<Operators>(Operators::Parts{
       .draws = &draws_,
@@ -200,6 +201,7 @@ void Night::StartLife() {
     if (death_.dying) throw Killed{*death_.dying};
     if (life) {
       life_ = std::move(*life);
+      judge_->LifeHasBegun();
       ++result_.lives;
       Tell(fmt::format("life {} begins", result_.lives));
     } else {

@@ -72,6 +72,9 @@ class Night {
       const std::function<bool(const UnitView&)>& wanted) const;
   void Pause();
   void SetRight();
+  void ClearFaults();
+  void HomeLost();
+  std::size_t LeaveOutTouching();
   void CheckEnd();
 
   Draws draws_;

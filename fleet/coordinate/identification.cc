@@ -5,6 +5,7 @@
 
 #include "fleet/coordinate/intents.h"
 #include "fleet/coordinate/reconcile.h"
+#include "fleet/coordinate/settling.h"
 #include "fleet/coordinate/unit_knowledge.h"
 
 namespace focalfleet {
@@ -14,12 +15,12 @@ using enum UnitPhase;
 
 // The questions of an identification, in order.
 constexpr int kSteps = 7;
-HostMessage StepQuestion(int step) {
+HostMessage StepQuestion(int step, bool resumes) {
   switch (step) {
     case 0:
       return IdentifyRequest{};
     case 1:
-      return StatusRequest{.resume = true};
+      return StatusRequest{.resume = resumes};
     case 2:
       return VectorRequest{Axis::kTheta};
     case 3:
@@ -59,11 +60,23 @@ void Bind(const Coordination& fleet, PositionerIndex i) {
   fleet.ledger.Note(BindingRow{fleet.layout.unit(i).id, view.serial, replaced});
 }
 
+/// The place is free, and so is the unit.
+bool IsFree(const Coordination& fleet, PositionerIndex i) {
+  const UnitView& view = fleet.units[i].view;
+  return view.bound_serial.value == 0 && !fleet.units.place_of.contains(view.serial);
+}
+
+/// Nothing follows from a restart of a foreign unit without an open move, so it is resumed at once.
+bool IsResumedAtOnce(const Coordination& fleet, PositionerIndex i) {
+  const UnitView& view = fleet.units[i].view;
+  return view.bound_serial != view.serial && !IsFree(fleet, i) &&
+         !fleet.ledger.intents.contains(view.serial);
+}
+
 /// True where the unit is bound to its place, or is bound to it here. False: it is foreign there.
 bool Belongs(const Coordination& fleet, PositionerIndex i) {
   UnitView& view = fleet.units[i].view;
-  const auto place = fleet.units.place_of.find(view.serial);
-  if (view.bound_serial.value == 0 && place == fleet.units.place_of.end()) {
+  if (IsFree(fleet, i)) {
     Bind(fleet, i);
   } else if (view.bound_serial != view.serial) {
     view.knowledge = {};
@@ -121,42 +134,12 @@ void Unfit(const Coordination& fleet, PositionerIndex i) {
   fleet.units.Report(i, UnitEventKind::kLost, "is not fit to move");
 }
 
-/// Puts the answers and the store side by side; the unit is kReady, kFault or lost afterwards.
-void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& store) {
+/// The unit has been read and its place is stored: it is kReady or kFault afterwards.
+void Finish(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];
-  UnitView& view = record.view;
-  const Reading& reading = record.reading;
-  // The unit tells of a restart once. A run that ended before it had stored what follows from it
-  // leaves nothing but the open intent. A move that ends where it began is believed even so: it is
-  // over, unless both the mark and that run were lost.
-  StatusReply status = reading.status;
-  status.restarted = std::exchange(record.restarted, false) ||
-                     (store.intent && !fleet.ledger.IsOfThisRun(*store.intent) &&
-                      store.intent->from != store.intent->to);
-  const Reconciled result =
-      Reconcile({status, fleet.units.PlaceAt(i, reading.position), reading.subdivision}, store);
-  const bool fault = reading.status.state == UnitState::kFault;
-  if (result.intent_end)
-    fleet.ledger.EndIntent(
-        fleet.units[i].view.serial,
-        result.intent_end == IntentEnd::kStopped && fault ? IntentEnd::kFault : *result.intent_end);
-  // The `done` was lost, but the unit stands short of its end without a fault, and nothing but a
-  // stop leaves it there.
-  if (result.intent_end == IntentEnd::kStopped && !fault && record.motion.runs_freely)
-    fleet.units.Report(i, UnitEventKind::kForeignStop);
-  record.motion.runs_freely = false;
-  if (!store.vector || store.vector->knowledge != result.knowledge)
-    Know(fleet, i, result.knowledge, Origin::kMove);
-  view.knowledge = result.knowledge;
-  const bool was_known = !store.vector || IsPlace(store.vector->knowledge);
-  if (IsPlace(result.knowledge)) fleet.ledger.alarms().End(AlarmName::kUnitPlaceLost, i, {});
-  if (!IsPlace(result.knowledge) && (result.intent_end || was_known))
-    fleet.ledger.alarms().Raise(AlarmName::kUnitPlaceLost, i, {},
-                                fleet.units.NameOf(i) + ": position " +
-                                    Name(result.knowledge[0].witness) + ", " + result.reason);
-  if (reading.status.state == UnitState::kFault) {
+  if (record.reading.status.state == UnitState::kFault) {
     fleet.units.SetPhase(i, kFault);
-    const FaultCode code = reading.status.fault;
+    const FaultCode code = record.reading.status.fault;
     if (fleet.ledger.alarms().Lasts(AlarmName::kUnitFault, i)) {
       NameFault(fleet, i, code);
     } else {
@@ -175,8 +158,52 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
   }
   fleet.units.SetPhase(i, kReady);
   fleet.ledger.alarms().End(AlarmName::kUnitFault, i, {});
-  const bool short_of_its_end = result.intent_end && *result.intent_end != IntentEnd::kArrived;
-  fleet.units.Report(i, short_of_its_end ? UnitEventKind::kStopped : UnitEventKind::kReady);
+  fleet.units.Report(
+      i, record.reading.short_of_its_end ? UnitEventKind::kStopped : UnitEventKind::kReady);
+}
+
+/// Closes the open move, for which others may have to stop.
+void EndOpenMove(const Coordination& fleet, PositionerIndex i, IntentEnd end) {
+  UnitRecord& record = fleet.units[i];
+  const bool fault = record.reading.status.state == UnitState::kFault;
+  const bool of_earlier_run = IsOfEarlierRun(fleet, i);
+  fleet.ledger.EndIntent(record.view.serial,
+                         end == IntentEnd::kStopped && fault ? IntentEnd::kFault : end);
+  record.reading.short_of_its_end = end != IntentEnd::kArrived;
+  if (of_earlier_run && record.reading.short_of_its_end) EndedEarly(fleet, i);
+  // The `done` was lost, but the unit stands short of its end without a fault, and nothing but a
+  // stop leaves it there.
+  if (end == IntentEnd::kStopped && !fault && record.motion.runs_freely)
+    fleet.units.Report(i, UnitEventKind::kForeignStop);
+}
+
+/// Puts the answers and the store side by side.
+void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& store) {
+  UnitRecord& record = fleet.units[i];
+  UnitView& view = record.view;
+  const Reading& reading = record.reading;
+  const Reconciled result = Reconcile(
+      {reading.status, fleet.units.PlaceAt(i, reading.position), reading.subdivision}, store);
+  if (result.intent_end) EndOpenMove(fleet, i, *result.intent_end);
+  record.motion.runs_freely = false;
+  if (!store.vector || store.vector->knowledge != result.knowledge)
+    Know(fleet, i, result.knowledge, Origin::kMove);
+  view.knowledge = result.knowledge;
+  const bool was_known = !store.vector || IsPlace(store.vector->knowledge);
+  if (IsPlace(result.knowledge)) fleet.ledger.alarms().End(AlarmName::kUnitPlaceLost, i, {});
+  if (!IsPlace(result.knowledge) && (result.intent_end || was_known))
+    fleet.ledger.alarms().Raise(AlarmName::kUnitPlaceLost, i, {},
+                                fleet.units.NameOf(i) + ": position " +
+                                    Name(result.knowledge[0].witness) + ", " + result.reason);
+}
+
+/// A unit that was resumed does not tell of its restart any more, so that is stored first: the
+/// daemon may end at any time.
+void ResumeWhenStored(const Coordination& fleet, PositionerIndex i) {
+  if (fleet.ledger.committed_through() >= *fleet.units[i].reading.resumes_after)
+    fleet.requests.Ask(i, StatusRequest{.resume = true});
+  else
+    fleet.timers.Set(i, kNever);  // until WakeStored
 }
 
 /// All answers of the identification are there.
@@ -201,7 +228,7 @@ void Concluded(const Coordination& fleet, PositionerIndex i) {
                    fleet.ledger.homing_configurations.contains(it->second.configuration));
     if (reading.status.state == UnitState::kMoving || reading.status.state == UnitState::kHoming) {
       view.knowledge = it->second.hull;
-      fleet.units.SetPhase(i, kSettling);
+      BeginSettling(fleet, i);
       return;
     }
   } else if (reading.status.state == UnitState::kMoving ||
@@ -216,6 +243,10 @@ void Concluded(const Coordination& fleet, PositionerIndex i) {
     return;
   }
   SettlePlace(fleet, i, store);
+  if (!reading.status.restarted && !reading.status.host_lost) return Finish(fleet, i);
+  const bool notes = !fleet.out().rows.empty();
+  record.reading.resumes_after = fleet.ledger.batch_now() - (notes ? 0u : 1u);
+  ResumeWhenStored(fleet, i);
 }
 
 /// The unit answers and cannot be used: its identity alone is asked from now on.
@@ -261,12 +292,14 @@ void OnNoSerial(const Coordination& fleet, PositionerIndex i) {
 
 }  // namespace
 
-HostMessage FirstQuestion() { return StepQuestion(0); }
+HostMessage FirstQuestion() { return StepQuestion(0, false); }
 
 void AskNext(const Coordination& fleet, PositionerIndex i) {
   const Reading& reading = fleet.units[i].reading;
   if (reading.step < kSteps) {
-    fleet.requests.Ask(i, StepQuestion(reading.step));
+    fleet.requests.Ask(i, StepQuestion(reading.step, IsResumedAtOnce(fleet, i)));
+  } else if (reading.resumes_after) {
+    ResumeWhenStored(fleet, i);
   } else {
     Concluded(fleet, i);
   }
@@ -282,6 +315,31 @@ void Identify(const Coordination& fleet, PositionerIndex i) {
   record.clock_reported = false;
   fleet.units.SetPhase(i, kIdentifying);
   AskNext(fleet, i);
+}
+
+void WakeStored(const Coordination& fleet) {
+  for (std::uint32_t n = 0; n < fleet.units.size(); ++n) {
+    const UnitRecord& record = fleet.units[{n}];
+    if (record.view.phase == kIdentifying && record.reading.resumes_after &&
+        !record.request.question)
+      fleet.timers.Set({n}, fleet.now());
+  }
+}
+
+void OnStatusRead(const Coordination& fleet, PositionerIndex i, const StatusReply& status) {
+  Reading& reading = fleet.units[i].reading;
+  if (!reading.resumes_after) {
+    reading.status = status;
+    ++reading.step;
+    // A move that an earlier run staged and never started is taken back first.
+    if (status.state == UnitState::kStaging || status.state == UnitState::kArmed)
+      fleet.requests.Ask(i, Stop{});
+  } else if (status.restarted && !reading.status.restarted) {
+    Identify(fleet, i);
+  } else {
+    reading.status = status;
+    Finish(fleet, i);
+  }
 }
 
 void NameFault(const Coordination& fleet, PositionerIndex i, FaultCode fault) {
@@ -305,6 +363,7 @@ void Lose(const Coordination& fleet, PositionerIndex i, UnitPhase phase, const s
     const auto& drive = fleet.drive(i).axis;
     Know(fleet, i, InterruptedHull(intent->second, {drive[0].subdivision, drive[1].subdivision}),
          Origin::kMove);
+    if (before == kSettling) StopSettlingNear(fleet, i, "may stand in its way");
   }
   fleet.requests.Forget(i);
   record.locating.reset();

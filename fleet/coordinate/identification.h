@@ -1,6 +1,8 @@
 // An identification reads a unit anew and settles what is known of it. Seven questions in a row ask
 // for identity, status, two vectors, two carrier counts and the clock. The answers are put beside
-// the store (reconcile.h), and the unit is ready, foreign, in fault or lost afterwards.
+// the store (reconcile.h), and the unit is ready, foreign, in fault or lost afterwards. A unit that
+// has restarted, or lost the host, says so until it is resumed. An eighth question does that as
+// soon as what follows is stored.
 //
 // Cost: about 14 frames of 140 bits a unit, so 100 units take 0.2 s of a 1 Mbit/s bus.
 #pragma once
@@ -25,6 +27,10 @@ void AskNext(const Coordination& fleet, PositionerIndex i);
 [[nodiscard]] HostMessage FirstQuestion();
 void OnIdentity(const Coordination& fleet, PositionerIndex i, const IdentifyReply& identity);
 void OnVector(const Coordination& fleet, PositionerIndex i, const VectorReply& vector);
+/// Pre: the unit is kIdentifying.
+void OnStatusRead(const Coordination& fleet, PositionerIndex i, const StatusReply& status);
+/// More of the store is durable: units that waited for it are resumed in this step.
+void WakeStored(const Coordination& fleet);
 
 /// The unit cannot be used any more: its phase is `phase`, and a kLost event says why. Without
 /// `alarm` one alarm of the caller stands for many units.

@@ -116,6 +116,12 @@ void MotionEnded(const Coordination& fleet, PositionerIndex i, const Done& done)
 
 void PollSooner(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];
+  if (record.view.phase == kSettling) {
+    const StallDetection pace = StallDetectionOf(fleet.config);
+    record.next_poll = fleet.now() + pace.poll;
+    record.request.question->suspect_at = fleet.now() + pace.suspicion;
+    return;
+  }
   // The watch lasts as long as the unit may have ended while that mattered.
   if (record.motion.seen_moving >= record.motion.watch_until) return;
   record.next_poll = std::min(
@@ -128,16 +134,11 @@ void OnStatus(const Coordination& fleet, PositionerIndex i, const StatusReply& s
   UnitRecord& record = fleet.units[i];
   UnitView& view = record.view;
   view.reported_state = status.state;
-  record.restarted = record.restarted || status.restarted;
   view.fault = status.fault;
   view.move = status.move;
   fleet.units.Changed(i);
   if (view.phase == kIdentifying) {
-    record.reading.status = status;
-    ++record.reading.step;
-    // A move that an earlier run staged and never started is taken back first.
-    if (status.state == UnitState::kStaging || status.state == UnitState::kArmed)
-      fleet.requests.Ask(i, Stop{});
+    OnStatusRead(fleet, i, status);
     return;
   }
   if (IsUnderWay(view.phase)) {

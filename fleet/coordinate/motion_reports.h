@@ -8,8 +8,8 @@
 
 namespace focalfleet {
 
-/// Others pass where the moving unit may stand: it is polled more often, and missed sooner
-/// (stall_detection.h). Pre: its status has just been asked.
+/// Others pass where the moving or settling unit may stand: it is polled more often, and missed
+/// sooner (stall_detection.h). Pre: its status has just been asked.
 void PollSooner(const Coordination& fleet, PositionerIndex i);
 
 void OnStatus(const Coordination& fleet, PositionerIndex i, const StatusReply& status);

@@ -17,12 +17,15 @@ Reconciled AfterIntent(const UnitSays& unit, const IntentRow& intent, bool homes
     return {InterruptedHull(intent, unit.subdivision), IntentEnd::kInterrupted,
             "power was lost in mid-move"};
   }
-  // FLASH gets the final vectors at the end of a motion. A unit that began, restarted and counts as
-  // where it began has lost its mark together with its power: it may stand anywhere on its way.
-  // Without a restart it was stopped before its first step.
-  if (began && unit.status.restarted && unit.position == intent.from)
+  // FLASH gets the final vectors at the end of a motion. A unit that began, restarted and does not
+  // count as at its end may have lost its mark together with its power, and its count with it: it
+  // stands anywhere on its way. Without a restart it was stopped, before its first step or later.
+  if (began && unit.status.restarted &&
+      (unit.position == intent.from || unit.position != intent.to))
     return {InterruptedHull(intent, unit.subdivision), IntentEnd::kInterrupted,
-            "it counts from where its last move began, though it began"};
+            unit.position == intent.from
+                ? "it counts from where its last move began, though it began"
+                : "it restarted, and does not count as at the end of its last move"};
   // The rotor may have met its stop and slipped while the vectors went on, and where homing began
   // was not known, as a rule.
   if (began && homes && unit.position != intent.to)

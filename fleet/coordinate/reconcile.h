@@ -3,6 +3,7 @@
 //
 //   mark set                            cut by a power loss        interval over its hull
 //   mark clear, intent open, begun      ended by itself, unheard   reported
+//   the same, restarted, not at its end it lost mark or count, too interval over its hull
 //   the same of homing, not at its stop cut short                  interval over its hull
 //   mark clear, intent open, not begun  never began                reported, if FLASH holds `from`
 //   no intent, FLASH equals the store   as good as before          as stored

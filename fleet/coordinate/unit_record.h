@@ -64,6 +64,10 @@ struct Reading {
   Pose position{};
   std::array<std::uint16_t, kAxisCount> subdivision{};
   std::array<std::int32_t, kAxisCount> counter1{};
+  // A unit that has restarted, or lost the host, says so until it is resumed. The host resumes it
+  // when this batch is stored, with what follows from that; none: it is not read to the end yet.
+  std::optional<std::uint64_t> resumes_after;
+  bool short_of_its_end = false;  // it stands short of the end of its last move
 };
 
 /// Reasons for which a unit that answers is not moved.
@@ -116,8 +120,8 @@ struct UnitRecord {
   UnitTrouble trouble;
   MotionState motion;
   HostInstant next_poll{INT64_MIN};
-  bool restarted = false;   // by its status, since its place was settled last
-  bool asked_once = false;  // has had the chance to answer since start
+  bool asked_once = false;   // has had the chance to answer since start
+  bool ended_early = false;  // its move of an earlier run ended before its end
   ClockMap clock;
   bool clock_reported = false;  // an alarm has said that its clock is off by more than plans allow
   std::uint8_t protocol_version = kProtocolVersion;  // in its last identity

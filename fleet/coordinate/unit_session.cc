@@ -8,6 +8,7 @@
 #include "fleet/coordinate/identification.h"
 #include "fleet/coordinate/motion_reports.h"
 #include "fleet/coordinate/sensor_reading.h"
+#include "fleet/coordinate/settling.h"
 #include "fleet/coordinate/unit_parameters.h"
 
 namespace focalfleet {
@@ -52,6 +53,8 @@ void UnitSessions::Service(PositionerIndex i) {
     if (fleet_.now() >= record.request.question->suspect_at) {
       record.request.question->suspect_at = kNever;
       fleet_.units.Report(i, UnitEventKind::kUnheard);
+      if (record.view.phase == kSettling)
+        StopSettlingNear(fleet_, i, "is not heard and may stand in its way");
     }
     if (fleet_.now() < record.request.question->deadline) {
       fleet_.timers.Set(i, record.request.question->deadline);
@@ -86,7 +89,8 @@ void UnitSessions::Service(PositionerIndex i) {
       return;
     case kIdentifying:
       AskNext(fleet_, i);
-      if (!record.request.waiting_writes.empty() && !record.request.question)
+      if (record.view.phase != kIdentifying && !record.request.waiting_writes.empty() &&
+          !record.request.question)
         fleet_.timers.Set(i, fleet_.now());  // it was read, and is served again
       return;
     case kForeign:
@@ -102,7 +106,7 @@ void UnitSessions::Service(PositionerIndex i) {
       const bool moves = IsUnderWay(record.view.phase);
       record.next_poll = fleet_.now() + fleet_.config.poll_period * (moves ? 1 : kRestPollFactor);
       fleet_.requests.Ask(i, StatusRequest{});
-      if (record.view.phase == kMoving) PollSooner(fleet_, i);
+      if (record.view.phase == kMoving || record.view.phase == kSettling) PollSooner(fleet_, i);
       return;
     }
     case kStaging:

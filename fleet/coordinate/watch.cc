@@ -33,14 +33,22 @@ bool Concerns(const Round& round, double since_s, double left_s, const Ended& wh
 /// Units that may have ended, whose followers have not been looked at yet.
 using Open = std::vector<std::pair<PositionerIndex, Ended>>;
 
+/// The unit may be on its way. A unit that is not heard may hear.
+bool MayMove(const Coordination& fleet, const Round& round, PositionerIndex i) {
+  const UnitView& view = fleet.units[i].view;
+  if (view.phase == UnitPhase::kMoving) return round.part(i) == Part::kMoving;
+  const auto intent = fleet.ledger.intents.find(view.serial);
+  return view.phase == UnitPhase::kSilent && intent != fleet.ledger.intents.end() &&
+         intent->second.move == round.MoveOf(i);
+}
+
 void StopFollower(const Coordination& fleet, const Round& round, const UnitPlan::Follower& follower,
                   const Ended& when, const std::string& reason, Open* open) {
   if (!Concerns(round, follower.since_s, follower.left_s, when)) return;
   const UnitRecord& unit = fleet.units[follower.unit];
   const bool asked =
       unit.request.question && std::holds_alternative<Stop>(unit.request.question->message);
-  if (round.part(follower.unit) != Part::kMoving || unit.view.phase != UnitPhase::kMoving || asked)
-    return;
+  if (asked || !MayMove(fleet, round, follower.unit)) return;
   StopOne(fleet, follower.unit, reason);
   // The follower ends when the stop gets through. Should that take longer, it is judged anew then.
   open->push_back({follower.unit, {fleet.now(), fleet.now() + fleet.requests.Patience()}});

@@ -50,6 +50,21 @@ TEST(Configuration, ParameterIsSetWhenTheUnitSaysSo) {
   EXPECT_EQ(silent.error->text, "unit 4 did not answer: it may have taken the value or not");
 }
 
+// The units have restarted, and the store cannot take what follows.
+TEST(Configuration, ParameterOfAUnitThatIsNotResumedYetWaitsForTheStore) {
+  InProcessFleet fleet(Small(45));
+  fleet.storage.fails = true;
+  fleet.Run(Seconds(1));
+  ASSERT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kIdentifying);
+  fleet.Send({7000, WriteParameterCommand{{3}, Axis::kTheta, Parameter::kRepeat, 54}});
+  fleet.Run(Seconds(1));
+  EXPECT_FALSE(fleet.LastReply(7000));
+  fleet.storage.fails = false;
+  fleet.Run(Seconds(2));
+  ASSERT_TRUE(fleet.LastReply(7000));
+  EXPECT_EQ(fleet.LastReply(7000)->text, "unit 4: theta repeat = 54");
+}
+
 TEST(Configuration, ParameterIsTakenAfterTheQuestionThatIsOpen) {
   InProcessFleet fleet(Small(44));
   fleet.Run(Seconds(5));

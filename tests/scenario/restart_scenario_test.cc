@@ -21,6 +21,7 @@ using test::HasAlarm;
 using test::InProcessFleet;
 using test::RunIntoMotion;
 using test::Small;
+using test::SomebodyMoving;
 using test::StopDirectly;
 using test::Unserved;
 
@@ -157,6 +158,60 @@ TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
     ExpectOthersArrive(&fleet, 0);
   }
   EXPECT_LE(unproven, 10);
+}
+
+// The power of a moving unit is cut, and its mark is lost with it. The run that reads the restart
+// is killed before it has stored what follows.
+TEST(Configuration, ARestartIsReportedUntilWhatFollowsIsStored) {
+  InProcessFleet fleet(Small(48));
+  fleet.ApplyRandom(48);
+  RunIntoMotion(&fleet, Seconds(2));
+  const PositionerIndex i = SomebodyMoving(&fleet);
+  fleet.Restart();
+  fleet.Run(Milliseconds(100));
+  fleet.world().disturb().PowerCut(fleet.id(i.value));
+  fleet.world().disturb().SpoilFlash(fleet.id(i.value), sim::FlashDamage::kNoMark);
+  fleet.Restart();
+  fleet.storage.fails = true;  // nothing of this run is stored
+  fleet.world().disturb().PowerOn(fleet.id(i.value));
+  fleet.Run(Seconds(5));
+  EXPECT_EQ(fleet.coordinator().unit(i).knowledge[0].witness, Witness::kInterval);
+  EXPECT_EQ(fleet.coordinator().unit(i).phase, UnitPhase::kIdentifying) << "not resumed yet";
+  fleet.storage.fails = false;
+  fleet.Restart();
+  fleet.Run(Seconds(90));
+  EXPECT_EQ(fleet.coordinator().unit(i).knowledge[0].witness, Witness::kInterval);
+  EXPECT_EQ(fleet.coordinator().unit(i).phase, UnitPhase::kReady);
+  ExpectStoreTellsTheTruth(fleet, "after the second run");
+}
+
+// The plan of units that an earlier run has sent off is gone: where one ends early, those near it
+// stop.
+TEST(Configuration, UnitsOfAnEarlierRunStopForOneThatEndsEarly) {
+  for (const bool silent : {false, true}) {
+    InProcessFleet fleet(Small(49));
+    fleet.ApplyRandom(49);
+    RunIntoMotion(&fleet, Seconds(1));
+    fleet.Restart();
+    fleet.Run(Seconds(1));
+    const PositionerIndex first = SomebodyMoving(&fleet);
+    std::vector<std::size_t> near;
+    for (const PositionerIndex j : fleet.layout().neighbours(first))
+      if (fleet.world().Truth(std::size_t{j.value}).state == UnitState::kMoving)
+        near.push_back(j.value);
+    ASSERT_GE(near.size(), 2u) << "nobody moves near it";
+    if (silent)
+      fleet.world().disturb().PowerCut(fleet.id(first.value));
+    else
+      fleet.world().disturb().RaiseFault(fleet.id(first.value), FaultCode::kDriver);
+    fleet.Run(Milliseconds(1300));
+    for (const std::size_t n : near)
+      EXPECT_NE(fleet.world().Truth(n).state, UnitState::kMoving) << "row " << n << " goes on";
+    const std::string name = "unit " + std::to_string(fleet.id(first.value).value);
+    EXPECT_TRUE(HasAlarm(fleet, name + (silent ? " is not heard" : " has ended early")));
+    fleet.Run(Seconds(90));
+    ExpectStoreTellsTheTruth(fleet, "at the end");
+  }
 }
 
 TEST(Configuration, TheOneThatTheDaemonDidNotEndHasFailed) {

@@ -8,8 +8,10 @@
 #include "daemon/journal/fields.h"
 #include "daemon/journal/step_record.h"
 #include "daemon/soak/campaign.h"
+#include "daemon/soak/judge.h"
 #include "daemon/soak/memory_disk.h"
 #include "daemon/soak/night.h"
+#include "daemon/soak/plant.h"
 #include "daemon/store/store.h"
 
 namespace focalfleet::soak {
@@ -95,7 +97,10 @@ TEST(Regression, Seed9_ANumberOfAPlanThatIsOverIsNoPlan) { ExpectKept(9); }
 
 // A unit lost its FLASH in the instant after it had begun a move, and the judge read the move
 // there.
-TEST(Regression, Seed556_TheMoveThatBeganIsNotReadInALostFlash) { ExpectKept(556); }
+TEST(Regression, Seed556_TheMoveThatBeganIsNotReadInALostFlash) { ExpectKept(556, RunSeed(556)); }
+
+// A unit that did not answer went on to where its follower had been stopped for it.
+TEST(Regression, Seed426_AFollowerThatIsNotHeardIsStopped) { ExpectKept(426, RunSeed(426)); }
 
 // The judge's own parts must be able to see what they look for.
 
@@ -165,6 +170,40 @@ TEST(MemoryDisk, LosesWhatWasNotSyncedAndDoesNothingForTheDead) {
   disk.fails = [](DiskOperation) { return SQLITE_OK; };
   disk.Kill();
   EXPECT_FALSE((*store)->Commit(RowsOf(3), {1'000'000}));
+}
+
+// A batch stands in pages that the kernel could not write, and a process reads it there. The batch
+// counts as stored where that process has begun, which writes the log once more before, and not
+// where the process could not start.
+TEST(Judge, NothingIsAcknowledgedByAProcessThatDoesNotStart) {
+  for (const bool begins : {false, true}) {
+    Rng rng(1);
+    MemoryDisk disk("judge-test");
+    const Draws draws = DrawSeed(1, {.units = 2, .faults = false});
+    const Plant plant(draws);
+    const Troubles troubles;
+    Judge judge(&plant, &disk, &troubles, draws);
+    auto store = Store::Open("store.sqlite", On(disk));
+    ASSERT_TRUE(store) << store.error().text;
+    const auto commit = [&](const std::vector<Row>& rows) {
+      judge.Commits(rows);
+      judge.Committed(rows, (*store)->Commit(rows, {1'000'000}).has_value());
+    };
+    commit(RowsOf(1));
+    disk.drops_failed_syncs = true;
+    disk.fails = [](DiskOperation operation) {
+      return operation == DiskOperation::kSync ? SQLITE_IOERR_FSYNC : SQLITE_OK;
+    };
+    commit(RowsOf(2));
+    disk.fails = [](DiskOperation) { return SQLITE_OK; };
+    disk.Kill();
+    judge.LifeBegins();
+    if (begins) judge.LifeHasBegun();
+    disk.CutPower(&rng);
+    EXPECT_TRUE(judge.broken().empty()) << judge.broken()[0];
+    judge.LifeBegins();
+    EXPECT_EQ(judge.broken().empty(), !begins);
+  }
 }
 
 TEST(StepRecord, ReadsBackWhatItWrote) {
