@@ -28,13 +28,6 @@ void Erase(const LastFirst& last_first, Members* members) {
     members->erase(members->begin() + static_cast<std::ptrdiff_t>(at));
 }
 
-void FitAnew(Fit* fit) {
-  constexpr int kRounds = 2;
-  UpdateResiduals(fit);
-  StepFit(fit);
-  SettleFit(fit, kRounds);
-}
-
 // Whether the structure follows the cause's own column: a bend there is the cause's shape, not
 // another structure.
 bool IsOwnShape(const Effect& effect, const UnknownFound& reported) {

@@ -8,6 +8,10 @@
 
 namespace focalfleet::sim {
 
+/// Share of the family-wise rate that each search of what is left has: structures, exposures, fine
+/// structure, clusters, and neighbours pushed apart.
+inline constexpr double kShareOfSearch = 0.3;
+
 /// ln P(chi-square of `dof` degrees of freedom > x). 0 for x <= 0. Pre: dof > 0.
 double LogChiSquareTail(double x, double dof);
 

@@ -9,8 +9,8 @@
 namespace focalfleet::sim {
 namespace {
 
-// The least probability of a name by itself is 1 less this. Half and double of it:
-// docs/diagnosis.md, Reliability.
+// Error rate of a name by itself: at most one in ten such names may be wrong. Half and double of
+// it: docs/diagnosis.md, Reliability.
 constexpr double kDoubtMax = 0.1;
 
 // The share of a structure's size in all that it and the name explain. Two errors of one size are
@@ -34,7 +34,8 @@ Verdict VerdictOf(const Diagnosis& diagnosis) {
 }  // namespace
 
 double DoubtOf(const CauseFound& cause, std::span<const UnknownFound> unknown) {
-  // Names without a rival where nothing was unknown, in 288 campaigns of three generators.
+  // Names without a rival where nothing was unknown, in 288 campaigns of three generators. Half and
+  // double of the doubt: docs/diagnosis.md, Reliability.
   constexpr double kWrong = 5, kNames = 192;
   constexpr double kAlone = (kWrong + 0.5) / (kNames + 1);  // the mean of Jeffreys' posterior
   if (TraitsOf(cause.cause).is_static) return 0;  // no other cause is like it, and none was wrong

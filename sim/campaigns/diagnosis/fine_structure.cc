@@ -20,7 +20,6 @@ constexpr std::size_t kNext = 8;   // partners of a row, by rank
 constexpr std::size_t kApart = 4;  // exposures; nearer ones may share the air
 constexpr double kClip = 3;        // limits an outlier's weight to that of one row
 constexpr double kPairsMin = 100;
-constexpr double kShareOfRate = 0.3;  // of the family-wise rate
 // Distances that count as near, as a share of the column's range.
 constexpr std::array kNear = {1.0 / 20000, 1.0 / 5000, 1.0 / 1250, 1.0 / 300, 1.0 / 80};
 
@@ -145,7 +144,7 @@ double SpreadOf(const std::vector<Row>& rows, Channel c) {
 class Clearest {
  public:
   Clearest(double family_wise, double looks)
-      : looks_(looks), least_(std::log(kShareOfRate * family_wise)) {}
+      : looks_(looks), least_(std::log(kShareOfSearch * family_wise)) {}
 
   void Look(double log_p, const UnknownFound& seen) {
     const double log_p_family = LogLeastOf(log_p, looks_);

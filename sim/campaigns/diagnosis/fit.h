@@ -52,6 +52,10 @@ void StepFit(Fit* fit);
 /// Repeats steps, noise and weights in turn, `rounds` at most, until the amplitudes rest.
 void SettleFit(Fit* fit, int rounds);
 
+/// Fits a model whose terms or events were changed. Amplitudes are linear: a step and two rounds of
+/// SettleFit suffice.
+void FitAnew(Fit* fit);
+
 /// Lets the zeros differ from homing to homing, and fits them.
 void FreeHomings(Fit* fit);
 

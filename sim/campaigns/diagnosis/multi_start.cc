@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "sim/campaigns/diagnosis/events.h"
 #include "sim/campaigns/diagnosis/homings.h"
@@ -15,15 +17,10 @@ double NegativeBicWith(Fit fit, const Noise& noise) {
   return NegativeBic(fit);
 }
 
-// The fit with these steps beside its terms.
-Fit WithEvents(const Fit& fit, const std::vector<EventTerm>& events) {
-  constexpr int kRounds = 3;
-  Fit with = fit;
-  with.model.events = events;
-  UpdateResiduals(&with);
-  StepFit(&with);
-  SettleFit(&with, kRounds);
-  return with;
+Fit WithEvents(Fit fit, std::vector<EventTerm> events) {
+  fit.model.events = std::move(events);
+  FitAnew(&fit);
+  return fit;
 }
 
 // Selects with and without steps in single units' angles, and takes the better fit for its price.

@@ -15,7 +15,6 @@ namespace {
 constexpr double kFarWhitened = 6;  // whitened length
 constexpr double kStuckTravel_deg = 5;
 constexpr double kStuckSpread_mm = 0.03;
-constexpr double kClusterShare = 0.3;      // of the family-wise rate
 constexpr double kClusterLeast = 4;        // units and exposures
 constexpr std::size_t kClusterMost = 200;  // far visits in a window
 // Share of the visits that are as near: some units do not move, or touch little.
@@ -275,7 +274,7 @@ std::optional<Cluster> FindCluster(const Fit& fit, const std::vector<std::size_t
   for (const std::size_t row : far) is_far[row] = 1;
   std::optional<Cluster> best;
   double least =
-      std::log(kClusterShare * family_wise / static_cast<double>(std::size(kClusterColumns)));
+      std::log(kShareOfSearch * family_wise / static_cast<double>(std::size(kClusterColumns)));
   for (const std::string_view name : kClusterColumns) {
     const FilledColumn* column = fit.facts->Find(name);
     if (column == nullptr || !column->varies()) continue;

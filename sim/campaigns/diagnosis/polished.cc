@@ -40,16 +40,13 @@ std::size_t StrongestOf(const Fit& fit, const CauseFound& cause) {
 
 void ReassessWithoutMisfitArtefacts(const Templates& templates, const SelectionRule& rule,
                                     const Fit& fit, std::vector<CauseFound>* causes) {
-  constexpr int kRounds = 2;
   for (CauseFound& cause : *causes) {
     Fit bare = fit;
     if (std::erase_if(bare.model.terms, [&](const ModelTerm& term) {
           return IsMisfitArtefact(term, cause, *causes);
         }) == 0)
       continue;
-    UpdateResiduals(&bare);
-    StepFit(&bare);
-    SettleFit(&bare, kRounds);
+    FitAnew(&bare);
     const std::size_t strongest = StrongestOf(bare, cause);
     if (strongest == kNoTerm) continue;
     for (const Rival& rival : FindRivals(templates, rule, bare, strongest))

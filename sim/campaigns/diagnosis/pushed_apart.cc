@@ -13,9 +13,8 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kShare = 0.3;  // of the family-wise rate, as other searches of the rest have
 // The chance of the directions alone, below which they say so, too: nearness alone is no push. Also
-// of a pair whose rows are reported with the others.
+// of a pair whose rows are reported with the others. Half and double of it: docs/diagnosis.md.
 constexpr double kChanceMax = 0.05;
 constexpr std::size_t kNoRow = SIZE_MAX;
 
@@ -124,7 +123,7 @@ std::optional<PushedApart> FindPushedApart(const Fit& fit, const std::vector<std
   for (const auto& [units, most] : of_units)
     sum.both += most.both, sum.directions += most.directions;
   const double log_p = LogCombined(sum.both, of_units.size());
-  if (rows.empty() || log_p > std::log(kShare * family_wise) ||
+  if (rows.empty() || log_p > std::log(kShareOfSearch * family_wise) ||
       LogCombined(sum.directions, of_units.size()) > std::log(kChanceMax))
     return std::nullopt;
   PushedApart found{.rows = {rows.begin(), rows.end()}, .log_p = log_p};

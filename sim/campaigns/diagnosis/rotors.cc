@@ -200,7 +200,6 @@ std::size_t LeaveAlone(std::size_t at, Fit* fit, Selection* selection) {
 // False where these data have no such wave.
 bool Exchange(const Templates& templates, const SelectionRule& rule, const RotorWay& way,
               std::size_t at, Fit* fit, Selection* selection) {
-  constexpr int kRounds = 2;
   const EffectAxis axis = fit->model.terms[at].form.axis;
   const Templates forms = ListTemplates(*FindEffect(way.cause), *fit->facts);
   const Template* bent = nullptr;
@@ -215,9 +214,7 @@ bool Exchange(const Templates& templates, const SelectionRule& rule, const Rotor
   term.form = *bent;
   term.amplitude.assign(groups * bent->columns, 0);
   term.sigma.assign(groups * bent->columns, 0);
-  UpdateResiduals(fit);
-  StepFit(fit);
-  SettleFit(fit, kRounds);
+  FitAnew(fit);
   selection->accepted[at].rivals = FindRivals(templates, rule, *fit, at);
   return true;
 }

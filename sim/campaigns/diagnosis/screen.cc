@@ -14,7 +14,7 @@ namespace {
 // Thresholds: the screen's share of the family-wise rate. A smaller share applies where the
 // structure is a small part of the residuals, because named causes always leave a little by their
 // shapes.
-constexpr double kUnknownShare = 0.3, kShareOfLittle = 0.01, kLittle = 0.1;
+constexpr double kShareOfLittle = 0.01, kLittle = 0.1;
 // Share of a look that has to be left beside the model. A cause is often nearly the true one, and
 // the screen looks for the little that it leaves.
 constexpr double kKeptOfScreenMin = 0.012;
@@ -91,7 +91,7 @@ std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, s
   const FleetGroups groups = GroupsOf(*fit.facts);
   const ScorePass pass = ScoreTemplates(fit, looks);
   const double tests = EffectiveTests(pass.scores, looks, seed);
-  const Best best = FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * family_wise,
+  const Best best = FindBest(pass, looks, groups, fit.parallel, tests, kShareOfSearch * family_wise,
                              kKeptOfScreenMin);
   if (best.at == kNoTerm) return std::nullopt;
   Evidence evidence = best.evidence;
@@ -154,7 +154,7 @@ std::optional<UnknownFound> FindOddExposures(const Fit& fit, double family_wise)
     const double most = *std::ranges::max_element(squares) / spread;
     const double log_p =
         LogLeastOf(LogChiSquareTail(most, 1), 2 * static_cast<double>(squares.size()));
-    if (log_p > std::log(kUnknownShare * family_wise)) continue;
+    if (log_p > std::log(kShareOfSearch * family_wise)) continue;
     if (clearest && clearest->p_value <= std::exp(log_p)) continue;
     const auto rows = static_cast<double>(fit.facts->campaign->rows());
     clearest = UnknownFound{.covariate = std::string(kOrder),

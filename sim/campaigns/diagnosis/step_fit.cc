@@ -232,6 +232,13 @@ void SettleFit(Fit* fit, int rounds) {
   UpdateWeights(fit);
 }
 
+void FitAnew(Fit* fit) {
+  constexpr int kRounds = 2;
+  UpdateResiduals(fit);
+  StepFit(fit);
+  SettleFit(fit, kRounds);
+}
+
 void FreeHomings(Fit* fit) {
   constexpr double kWide_deg = 60;
   constexpr int kRounds = 6;

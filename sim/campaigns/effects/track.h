@@ -56,7 +56,7 @@ struct CampaignFacts {
   // Shape: (rows), or empty where no row is: the loop was closed before the move (closed_loop.h).
   std::vector<char> closed;
   std::vector<double> step_deg[2];  // Shape: (rows): as commanded, wraps of whole turns undone
-  // Shape: (units): indices of the units that are near enough for their motors to pull.
+  // Shape: (units): indices of the first few units within 1.3 pitches; none for units without rows.
   std::vector<std::vector<std::size_t>> neighbours;
   // Where rotors stand at motor angles of 0, deg, by unit_id, as the pull of their neighbours shows
   // it (diagnosis/rotor_phases.h). Empty where that is not known.

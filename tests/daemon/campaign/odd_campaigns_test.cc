@@ -21,6 +21,7 @@
 #include "daemon/campaign/next_moves_file.h"
 #include "daemon/campaign/verdict_sentence.h"
 #include "fleet/files/layout_file.h"
+#include "sim/campaigns/diagnosis/decide.h"
 #include "tests/sim/campaigns/campaign/odd_places.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 
@@ -211,10 +212,13 @@ std::vector<std::string> NoNumbersIn(const std::string& text) {
   return found;
 }
 
-// Each cause shares a probability out among its candidates. A tenth is left at most, unless
-// "unknown" is one of them and has the rest.
-void ExpectPosteriors(const nlohmann::json& report) {
-  for (const nlohmann::json& cause : report["causes"]) {
+// Each cause shares out among its candidates what its doubt leaves of 1. "unknown" has the doubt
+// where it is one of them, and is one where the doubt is above a tenth.
+void ExpectPosteriors(const sim::Diagnosis& diagnosis, const nlohmann::json& report) {
+  ASSERT_EQ(report["causes"].size(), diagnosis.causes.size());
+  for (std::size_t k = 0; k < diagnosis.causes.size(); ++k) {
+    const nlohmann::json& cause = report["causes"][k];
+    const double doubt = sim::DoubtOf(diagnosis.causes[k], diagnosis.unknown);
     double sum = 0;
     EXPECT_EQ(cause["posterior"].size(), cause["candidates"].size()) << cause;
     for (const nlohmann::json& candidate : cause["candidates"]) {
@@ -224,10 +228,11 @@ void ExpectPosteriors(const nlohmann::json& report) {
       EXPECT_GE(probability, 0) << cause;
       sum += probability;
     }
-    if (cause["posterior"].contains("unknown"))
-      EXPECT_NEAR(sum, 1, 1e-9) << cause;
-    else
-      EXPECT_TRUE(sum > 0.9 - 1e-9 && sum < 1 + 1e-9) << cause;
+    const bool has_unknown = cause["posterior"].contains("unknown");
+    EXPECT_EQ(has_unknown, doubt > 0.1) << cause;
+    EXPECT_NEAR(sum, has_unknown ? 1 : 1 - doubt, 1e-9) << cause;
+    const double of_unknown = cause["posterior"].value("unknown", doubt);
+    EXPECT_NEAR(of_unknown, doubt, 1e-9) << cause;
     EXPECT_TRUE(cause["at_bound"].is_boolean()) << cause;
   }
 }
@@ -267,7 +272,7 @@ TEST_P(OddCampaign, IsDiagnosedInNumbers) {
   EXPECT_THAT(NoNumbersIn(WriteNextMoves(campaign.units, diagnosis.next.moves)), IsEmpty());
   const nlohmann::json report = ReportJson(diagnosis, names);
   EXPECT_THAT(NoNumbersIn(report.dump()), IsEmpty());
-  ExpectPosteriors(report);
+  ExpectPosteriors(diagnosis, report);
   const std::string by_class = WriteUnitsByClass(diagnosis);
   EXPECT_THAT(NoNumbersIn(by_class), IsEmpty());
   ExpectUnitsByClass(campaign, by_class, report["units_by_class"]);
