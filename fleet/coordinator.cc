@@ -46,8 +46,7 @@ class Coordinator::Impl {
     for (const PlanDone& plan : inputs.plans) executor_.OnPlan(plan);
     for (const ExposureDone& exposure : inputs.exposures) executor_.OnExposure(exposure);
     for (const Command& command : inputs.commands) Obey(command);
-    if (inputs.committed_through > stored_through_) WakeStored(fleet_);
-    stored_through_ = inputs.committed_through;
+    WakeStored(fleet_);
     while (const auto due = timers_.TakeDue(step_.now)) sessions_.Service(*due);
     executor_.Advance();
     effects->wake_at = std::min(effects->wake_at, executor_.due());
@@ -201,8 +200,7 @@ class Coordinator::Impl {
   Ledger ledger_;
   Requests requests_;
   BusTraffic traffic_;
-  const Coordination fleet_;          // of the members above
-  std::uint64_t stored_through_ = 0;  // at the last step
+  const Coordination fleet_;  // of the members above
   UnitSessions sessions_;
   ConfigurationExecutor executor_;
 };

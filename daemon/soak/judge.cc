@@ -16,9 +16,12 @@ namespace {
 constexpr std::size_t kBrokenMax = 20;
 /// A rotor lags behind its field by less than this at rest. Units: vectors.
 constexpr double kLagVectors = 24;
-/// The same where a camera found the unit. Near the stretched arm a fibre that is seen 10 um off,
-/// five times the camera's noise, puts an arm of 8.25 mm 4 degrees off.
-constexpr double kSeenVectors = 950;
+/// The same where a camera found the unit. A fibre that is seen 10 um off, five times the camera's
+/// noise, puts an arm of 8.25 mm 4 degrees off where the arm is stretched, and 1.7 degrees at 5
+/// degrees from that.
+constexpr double kSeenVectors = 400;
+constexpr double kSeenStretchedVectors = 950;
+constexpr double kStretchedDeg = 5;
 /// From the fibre of a measured place to where it is: as much, and the lag of both rotors at the
 /// reach of 16.5 mm.
 constexpr double kSeen_mm = 0.04;
@@ -30,6 +33,8 @@ constexpr DurationNs kStopWithin = Milliseconds(150);
 /// A fault that kept a stop from a unit may lead to contact so long after it.
 constexpr DurationNs kContactAfter = Seconds(60);
 constexpr std::size_t kReportedMax = 64;
+/// A start signal of so long ago makes no unit begin any more.
+constexpr DurationNs kMoveStale = Seconds(600);
 /// A row may be so much older than its commit, where the disk fails.
 constexpr DurationNs kRowHeld = Seconds(30);
 
@@ -43,7 +48,6 @@ Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* trouble
              const Draws& draws)
     : plant_(plant),
       troubles_(troubles),
-      slack_vectors_(draws.camera ? kSeenVectors : kLagVectors),
       store_(disk,
              [this](const std::string& rule, const std::string& what) { Broken(rule, what); }),
       seen_(plant->layout().size()),
@@ -85,7 +89,9 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
   for (const Row& row : rows)
     if (const auto* vector = std::get_if<VectorRow>(&row)) {
       const HostInstant at{ReadVirtualNs()};
-      stored_.try_emplace(vector->serial.value, Stored{at, at}).first->second.last = at;
+      stored_.try_emplace(vector->serial.value, Stored{at, at, kLagVectors}).first->second.last =
+          at;
+      NoteSeen(*vector);
       auto& places = reported_[vector->serial.value];
       places.push_back(PlaceOf(*vector));
       if (places.size() > kReportedMax) places.pop_front();
@@ -115,7 +121,9 @@ void Judge::Sends(BusId bus, const CanFrame& frame) {
   if (function != kStart && function != kHome) return;
   const StoredPicture* durable = store_.Durable();
   if (durable == nullptr) return;
-  for (const auto& [serial, intent] : durable->intents) allowed_.insert({intent.unit, intent.move});
+  const HostInstant now{ReadVirtualNs()};
+  for (const auto& [serial, intent] : durable->intents)
+    allowed_.insert_or_assign({intent.unit, intent.move}, now);
 }
 
 void Judge::Published(const StatusBatch& status) {
@@ -169,6 +177,11 @@ void Judge::Look(HostInstant now) {
     LookAtPlace(row, truths.back());
     LookAtStop(row, truths.back());
   }
+  if (now > forget_at_) {
+    forget_at_ = now + kMoveStale;
+    std::erase_if(allowed_, [&](const auto& move) { return move.second < now - kMoveStale; });
+    std::erase_if(blind_, [&](const Move& move) { return !allowed_.contains(move); });
+  }
   motion_.Look(now, truths, near_);
   LookForContact(truths);
 }
@@ -185,7 +198,7 @@ void Judge::LookAtStarts(std::size_t row, const sim::UnitTruth& truth) {
   if (allowed == allowed_.end())
     Broken("start", fmt::format("unit {} began move {} without a durable intent", truth.id.value,
                                 truth.last_move.value));
-  else if (truth.state == UnitState::kMoving && blind_.contains(*allowed))
+  else if (truth.state == UnitState::kMoving && blind_.contains(allowed->first))
     Broken("start", fmt::format("unit {} began move {} from a place that is not known",
                                 truth.id.value, truth.last_move.value));
 }
@@ -227,7 +240,7 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
   const auto since = std::ranges::count_if(cuts, [&](HostInstant cut) {
     return known == stored_.end() || cut > known->second.last - kRowHeld;
   });
-  double slack = slack_vectors_;
+  double slack = known == stored_.end() ? kLagVectors : known->second.slack_vectors;
   const bool open = intent != acknowledged().intents.end();
   slack =
       std::max(slack, kJumpVectors * static_cast<double>(std::max<std::ptrdiff_t>(since, open)));
@@ -250,6 +263,23 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
                        intent != acknowledged().intents.end() ? "an open move within " : "", low,
                        high));
   }
+}
+
+/// The count of a unit keeps the error with which its place was measured last.
+void Judge::NoteSeen(const VectorRow& vector) {
+  const auto unit = std::ranges::find_if(acknowledged().units, [&](const auto& each) {
+    return each.second.serial == vector.serial.value;
+  });
+  if (vector.knowledge[1].witness != Witness::kMeasured || unit == acknowledged().units.end())
+    return;
+  const auto row = plant_->layout().Find(UnitId{unit->first});
+  if (!row) return;
+  const Unit& arm = plant_->layout().unit(*row);
+  const double phi_deg = arm.axis[1].zero_deg +
+                         static_cast<double>(vector.knowledge[1].low) *
+                             DegreesPerVector(arm.axis[1], plant_->drives()[row->value].axis[1]);
+  stored_[vector.serial.value].slack_vectors =
+      std::abs(phi_deg) < kStretchedDeg ? kSeenStretchedVectors : kSeenVectors;
 }
 
 /// A measured place is one of the fibre; the axes are worth less near the stretched arm.

@@ -61,8 +61,8 @@ class Judge {
   void LifeHasBegun();
   /// The state of the queues of a life.
   void Queues(std::size_t batches, std::span<const ShellFacts::Bus> buses);
-  /// An operator takes the risk of contact from here on.
-  void RiskTaken() { risk_ = true; }
+  /// An operator takes the risk of contact from here on, or does not any more.
+  void RiskTaken(bool taken) { risk_ = taken; }
 
   void Broken(const std::string& rule, const std::string& what);
   [[nodiscard]] const std::vector<std::string>& broken() const { return broken_; }
@@ -86,27 +86,29 @@ class Judge {
   void LookAtStop(std::size_t row, const sim::UnitTruth& truth);
   void LookForContact(std::span<const sim::UnitTruth> truths);
   void NoteBlind(std::span<const Row> rows);
+  void NoteSeen(const VectorRow& vector);
   [[nodiscard]] std::size_t BusOf(std::size_t row) const;
 
   const Plant* plant_;
   const Troubles* troubles_;
-  double slack_vectors_ = 0;
   HostInstant now_{0};
   StoreJudge store_;
   struct Stored {
     HostInstant first;
     HostInstant last;
+    double slack_vectors = 0;  // of its counts
   };
   std::map<std::uint32_t, Stored> stored_;                     // times of places, by serial
   std::map<std::uint32_t, std::deque<StoredPlace>> reported_;  // acknowledged places, newest last
   using Move = std::pair<std::uint32_t, std::uint32_t>;        // unit, move
-  std::set<Move> allowed_;                                     // by a durable intent
+  std::map<Move, HostInstant> allowed_;  // by a durable intent, and when that was seen last
   std::set<Move> blind_;  // whose intent was acknowledged while the unit's place was not exact
   std::vector<Seen> seen_;
   MotionJudge motion_;
   std::vector<std::vector<std::size_t>> near_;
   std::set<std::pair<std::size_t, std::size_t>> touching_;
   bool risk_ = false;
+  HostInstant forget_at_{0};  // stale moves
   std::vector<std::string> broken_;
 };
 

@@ -96,11 +96,30 @@ StoreWriter::Sinks Life::MakeSinks() {
   sinks.log_info = around_.log;
   sinks.monotonic_ns = &ReadVirtualNs;
   sinks.wall = &ReadVirtualWall;
+  sinks.upkeep = Upkeep();
   sinks.progressed = [this] { progressed_ = true; };
   sinks.offered = [this] {
     if (writer_due_ == kNever) writer_due_ = clock_.Now() + around_.commit_takes();
   };
   return sinks;
+}
+
+/// As PruningOf of the daemon, on virtual time.
+std::function<bool()> Life::Upkeep() const {
+  constexpr std::uint32_t kRowsAtOnce = 2000;
+  if (around_.keep_days == 0) return [] { return false; };
+  const auto newest = store_->Newest();
+  if (!newest) around_.log("no history is pruned: " + newest.error().text);
+  return [this, newest = newest.value_or(WallTime{0}), opened_ns = ReadVirtualNs()] {
+    const WallTime before =
+        OldBefore({.now = ReadVirtualWall(),
+                   .newest = newest,
+                   .open_s = 1e-9 * static_cast<double>(ReadVirtualNs() - opened_ns),
+                   .keep_days = around_.keep_days});
+    if (before.ns <= 0) return false;
+    const auto gone = store_->Prune(before, kRowsAtOnce);
+    return gone && gone->more;
+  };
 }
 
 void Life::MakeQueues() {

@@ -35,6 +35,7 @@ struct Surroundings {
   std::function<DurationNs()> plan_takes;
   std::function<bool()> planner_fails;
   PowerLimits plan_limits;
+  std::uint32_t keep_days = 0;  // of history; 0: all
   std::function<bool()> planner_has_room;
   std::function<bool()> reader_fails;
   std::function<bool()> publisher_has_room;
@@ -75,6 +76,7 @@ class Life {
   explicit Life(const Surroundings& around);
   Status Open();
   [[nodiscard]] StoreWriter::Sinks MakeSinks();
+  [[nodiscard]] std::function<bool()> Upkeep() const;
   void MakeQueues();
   void MakeShell();
   ShellFacts Facts() const;

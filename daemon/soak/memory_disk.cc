@@ -327,6 +327,22 @@ std::size_t MemoryDisk::bytes() const {
   return sum;
 }
 
+std::size_t MemoryDisk::size(const std::string& file) const {
+  const auto found = files_.find(file);
+  return found == files_.end() ? 0 : found->second->written.size();
+}
+
+std::size_t MemoryDisk::memory() const {
+  std::size_t sum = sizeof(*old_regions_.front()) * old_regions_.size();
+  for (const auto& file : gone_) sum += file->written.capacity() + file->synced.capacity();
+  for (const auto& [path, file] : files_) {
+    sum += file->written.capacity() + file->synced.capacity();
+    sum += sizeof(*file->regions.front()) * file->regions.size();
+    for (const Change& change : file->unsynced) sum += sizeof(change) + change.bytes.capacity();
+  }
+  return sum;
+}
+
 void MemoryDisk::Apply(const Change& change, std::string* content) {
   if (change.bytes.empty()) {
     content->resize(std::min(content->size(), change.offset));

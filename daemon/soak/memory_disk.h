@@ -58,6 +58,10 @@ class MemoryDisk {
   /// Replaces all files. Pre: none is open.
   void Load(DiskPicture picture);
   [[nodiscard]] std::size_t bytes() const;
+  /// The written size of a file; 0: there is none.
+  [[nodiscard]] std::size_t size(const std::string& file) const;
+  /// Memory of the process that this disk takes. Units: bytes.
+  [[nodiscard]] std::size_t memory() const;
 
  private:
   struct Change {

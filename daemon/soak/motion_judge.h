@@ -4,7 +4,7 @@
 //
 //   start      All start signals of a move name the same instant, on every bus and in every repeat.
 //   followers  A unit that has ended by itself stands in the way of no unit that still moves, from
-//              1.3 s after its end on.
+//              1.3 s after its end, and after the other's begin, on.
 //   power      The motors of a rail draw no more than a plan may.
 #pragma once
 

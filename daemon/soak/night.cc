@@ -95,6 +95,7 @@ Surroundings Night::Around() {
   };
   around.planner_fails = [this] { return faults_->Happens(kPlannerFails, 50); };
   around.plan_limits = PlanLimits(draws_);
+  around.keep_days = options_.keep_days;
   around.planner_has_room = [this] { return !faults_->Happens(kPlannerFull, 50); };
   around.reader_fails = [this] { return faults_->Happens(kStoreReaderFails, 20); };
   around.publisher_has_room = [this] { return !faults_->Happens(kReaderBehind, 20); };
@@ -282,10 +283,35 @@ void Night::RunUntil(HostInstant end, const std::function<bool()>& done) {
   }
 }
 
+Liveness Night::SecondPhase() {
+  return Liveness({.layout = &plant_->layout(),
+                   .operators = operators_.get(),
+                   .judge = judge_.get(),
+                   .coordinator = [this] { return life_ ? &life_->coordinator() : nullptr; },
+                   .run =
+                       [this](double seconds, const std::function<bool()>& done) {
+                         RunUntil(now_ + Seconds(seconds), done);
+                       },
+                   .tell = [this](const std::string& what) { Tell(what); }});
+}
+
+void Night::Converge() {
+  Tell("liveness");
+  faults_->Heal(now_);
+  // The wall clock may be anywhere; people set it right.
+  t_virtual_time.wall_less_host_ns =
+      std::max(t_virtual_time.wall_less_host_ns, std::int64_t{1'700'000'000'000'000'000});
+  SecondPhase().Converge();
+}
+
 NightResult Night::Run() {
   Tell("safety");
   RunUntil(now_ + draws_.safety);
   if (judge_->broken().empty()) Converge();
+  return Finish();
+}
+
+NightResult Night::Finish() {
   if (life_ != nullptr) result_.steps += life_->steps();
   disk_->Kill();
   life_.reset();

@@ -16,7 +16,9 @@
 #include "daemon/soak/fault_injector.h"
 #include "daemon/soak/judge.h"
 #include "daemon/soak/life.h"
+#include "daemon/soak/liveness.h"
 #include "daemon/soak/operators.h"
+#include "daemon/soak/week.h"
 
 namespace focalfleet::soak {
 
@@ -43,14 +45,21 @@ struct NightOptions {
   bool replay = false;
   /// The log of the daemon; none: it is not kept.
   std::function<void(const std::string&)> log;
+  std::uint32_t keep_days = 0;  // of history; 0: all
 };
 
 class Night {
  public:
   Night(const Draws& draws, const NightOptions& options);
   NightResult Run();
+  /// Instead of a night; `take` gets the sizes after each configuration. Pre: the draws have no
+  /// faults.
+  NightResult RunWeek(const Week& week, const std::function<void(const WeekSizes&)>& take);
 
  private:
+  NightResult Finish();
+  void PassDay();
+  [[nodiscard]] WeekSizes SizesAfter(std::uint32_t configuration, std::uint32_t night) const;
   Surroundings Around();
   void RunUntil(HostInstant end, const std::function<bool()>& done = {});
   void TurnOfLife();
@@ -64,18 +73,8 @@ class Night {
   bool Hear(ClientId client, std::string_view line, bool last);
   void Look();
   void Tell(const std::string& what);
-  // ---- the second phase
+  [[nodiscard]] Liveness SecondPhase();
   void Converge();
-  bool WaitFor(std::uint64_t request, double seconds);
-  bool Settle(double seconds);
-  [[nodiscard]] std::vector<std::uint32_t> UnitsThat(
-      const std::function<bool(const UnitView&)>& wanted) const;
-  void Pause();
-  void SetRight();
-  void ClearFaults();
-  void HomeLost();
-  std::size_t LeaveOutTouching();
-  void CheckEnd();
 
   Draws draws_;
   NightOptions options_;

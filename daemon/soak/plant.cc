@@ -46,7 +46,7 @@ Plant::Plant(const Draws& draws) {
 
 void Plant::Advance(HostInstant now) {
   delivered_.clear();
-  world_->AdvanceTo(now, &delivered_, &wire_);
+  world_->AdvanceTo(now, &delivered_);
   const auto buses = layout_->buses();
   for (const ReceivedFrame& frame : delivered_) {
     const auto at = std::lower_bound(buses.begin(), buses.end(), frame.bus) - buses.begin();

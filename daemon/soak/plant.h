@@ -35,8 +35,6 @@ class Plant {
   [[nodiscard]] const sim::World& world() const { return *world_; }
   [[nodiscard]] std::vector<ReceivedFrame>* heard(std::size_t bus) { return &heard_[bus]; }
   [[nodiscard]] bool hears() const;
-  /// Frames of all buses since the last call, in order.
-  std::vector<sim::WireFrame> TakeWire() { return std::exchange(wire_, {}); }
   /// The newest answer of this unit to a question of the same kind, under another
   /// sequence number. None: there is none among its last ones.
   [[nodiscard]] std::optional<CanFrame> AnsweredBefore(std::size_t bus,
@@ -51,7 +49,6 @@ class Plant {
   std::unique_ptr<sim::World> world_;
   std::vector<std::vector<ReceivedFrame>> heard_;  // Shape: as the layout's buses
   std::vector<ReceivedFrame> delivered_;
-  std::vector<sim::WireFrame> wire_;
   bool remembers_ = false;
   std::map<std::pair<std::size_t, std::uint32_t>, std::deque<CanFrame>> answers_;  // by bus, node
 };

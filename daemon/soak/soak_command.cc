@@ -47,6 +47,24 @@ int Report(const Summary& summary, const std::vector<std::uint64_t>& missing) {
   return static_cast<int>(good ? ExitCode::kOk : ExitCode::kRefused);
 }
 
+int RunWeek(std::uint64_t seed, const SoakOptions& options) {
+  constexpr std::uint32_t kKeepDays = 3;  // so that pruning shows within the week
+  const auto print = [](const std::string& line) {
+    std::fprintf(stdout, "%s\n", line.c_str());
+    std::fflush(stdout);
+  };
+  DrawLimits limits{.units = {}, .faults = false};
+  if (options.units > 0) limits.units = options.units;
+  print(WeekColumns());
+  const NightResult result = Night(DrawSeed(seed, limits), {.keep_days = kKeepDays})
+                                 .RunWeek({.configurations = options.week},
+                                          [&](const WeekSizes& sizes) { print(WeekLine(sizes)); });
+  for (const std::string& broken : result.broken)
+    std::fprintf(stderr, "focalfleet-sim: seed %llu %s\n", static_cast<unsigned long long>(seed),
+                 broken.c_str());
+  return static_cast<int>(result.ok() ? ExitCode::kOk : ExitCode::kRefused);
+}
+
 }  // namespace
 
 CLI::App* AddSoak(CLI::App* app, SoakOptions* options) {
@@ -55,6 +73,7 @@ CLI::App* AddSoak(CLI::App* app, SoakOptions* options) {
   soak->footer(
       "  focalfleet-sim soak --seeds 1..200\n"
       "  focalfleet-sim soak --seeds 17 --tell\n"
+      "  focalfleet-sim soak --seeds 1 --week 1000 --units 5000 > week.csv\n"
       "  focalfleet-sim soak --seeds 1..200 --merge results");
   soak->add_option("--seeds", options->seeds, "FIRST..LAST, or one seed")
       ->required()
@@ -66,6 +85,13 @@ CLI::App* AddSoak(CLI::App* app, SoakOptions* options) {
   soak->add_option("--json", options->json_folder,
                    "Folder to which one line of JSON a seed is appended")
       ->type_name("DIR");
+  soak->add_option("--week", options->week,
+                   "A week of nights without faults instead: so many configurations over seven "
+                   "lives, and a line of CSV with the sizes of memory and disk after each")
+      ->check(CLI::Range(1, 1'000'000))
+      ->excludes("--minutes")
+      ->excludes("--json")
+      ->type_name("CONFIGURATIONS");
   soak->add_option("--merge", options->merge_folder,
                    "Run nothing: make the table of the lines in this folder, and name seeds of the "
                    "range that never ran")
@@ -87,6 +113,10 @@ int RunSoak(const SoakOptions& options) {
     return Report(*merged, NeverRan(*merged, *seeds));
   }
   spdlog::set_level(spdlog::level::off);
+  if (options.week > 0 && (seeds->first != seeds->last || options.twice || options.replay))
+    return ComplainOf({ErrorCode::kInvalid, "--week takes one seed, and runs it once"},
+                      ExitCode::kUsage);
+  if (options.week > 0) return RunWeek(seeds->first, options);
   CampaignOptions campaign{.seeds = *seeds,
                            .minutes = {},
                            .units = {},

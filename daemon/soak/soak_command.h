@@ -15,6 +15,7 @@ struct SoakOptions {
   std::string merge_folder;
   double minutes = 0;
   std::uint32_t units = 0;
+  std::uint32_t week = 0;
   bool twice = false;
   bool replay = false;
   bool tell = false;

@@ -55,6 +55,7 @@ std::optional<StoredPicture> PictureReader::Read(DiskPicture picture, std::strin
     read.reset();
   }
   sqlite3_close_v2(db);
+  disk_.Load({});  // a picture of a large fleet takes memory
   return read;
 }
 

@@ -26,20 +26,16 @@ bool IsAwaited(const UnitRecord& unit) {
          !unit.request.waiting_writes.empty();
 }
 
-/// Plans need numbers of moves from the store, and units that are resumed when it holds their
-/// places.
-bool IsStoreAwaited(const Coordination& fleet) {
-  return !fleet.ledger.MovesAreReserved() ||
-         std::ranges::any_of(fleet.units.all(), [](const UnitRecord& unit) {
-           return unit.view.phase == kIdentifying && unit.reading.resumes_after.has_value();
-         });
+bool AwaitsStore(const UnitRecord& unit) {
+  return unit.view.phase == kIdentifying && unit.reading.stored_by.has_value();
 }
 
 void SayWhatIsWaitedFor(ExecutorRooms* rooms) {
   const Coordination& fleet = rooms->fleet;
   Configuration& configuration = rooms->configuration;
   const Phase phase = configuration.phase();
-  const bool needs_the_store = (phase == Phase::kGathering && IsStoreAwaited(fleet)) ||
+  const bool needs_the_store = (phase == Phase::kGathering && !fleet.ledger.MovesAreReserved()) ||
+                               std::ranges::any_of(fleet.units.all(), AwaitsStore) ||
                                phase == Phase::kCommitting || phase == Phase::kHomeCommitting ||
                                phase == Phase::kReporting;
   configuration.view.waiting_for =
@@ -83,7 +79,8 @@ void ConfigurationProgress::GatherIfDue() {
                         std::ranges::any_of(fleet_.units.all(), [](const UnitRecord& unit) {
                           return unit.view.phase == kSettling;
                         });
-  if ((waiting && fleet_.now() < gather_until_) || settling || IsStoreAwaited(fleet_)) {
+  if ((waiting && fleet_.now() < gather_until_) || settling || !fleet_.ledger.MovesAreReserved() ||
+      std::ranges::any_of(fleet_.units.all(), AwaitsStore)) {
     configuration_.due = fleet_.now() + kGatherStep;
     return;
   }

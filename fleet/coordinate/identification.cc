@@ -13,8 +13,9 @@ namespace {
 
 using enum UnitPhase;
 
-// The questions of an identification, in order.
+// The questions of an identification, in order. The first ones tell where the unit is.
 constexpr int kSteps = 7;
+constexpr int kStepsOfPlace = 4;
 HostMessage StepQuestion(int step, bool resumes) {
   switch (step) {
     case 0:
@@ -64,13 +65,6 @@ void Bind(const Coordination& fleet, PositionerIndex i) {
 bool IsFree(const Coordination& fleet, PositionerIndex i) {
   const UnitView& view = fleet.units[i].view;
   return view.bound_serial.value == 0 && !fleet.units.place_of.contains(view.serial);
-}
-
-/// Nothing follows from a restart of a foreign unit without an open move, so it is resumed at once.
-bool IsResumedAtOnce(const Coordination& fleet, PositionerIndex i) {
-  const UnitView& view = fleet.units[i].view;
-  return view.bound_serial != view.serial && !IsFree(fleet, i) &&
-         !fleet.ledger.intents.contains(view.serial);
 }
 
 /// True where the unit is bound to its place, or is bound to it here. False: it is foreign there.
@@ -134,9 +128,10 @@ void Unfit(const Coordination& fleet, PositionerIndex i) {
   fleet.units.Report(i, UnitEventKind::kLost, "is not fit to move");
 }
 
-/// The unit has been read and its place is stored: it is kReady or kFault afterwards.
+/// The unit has been read to the end, and is kReady or kFault afterwards.
 void Finish(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];
+  const bool ended_short = std::exchange(record.motion.ended_short, false);
   if (record.reading.status.state == UnitState::kFault) {
     fleet.units.SetPhase(i, kFault);
     const FaultCode code = record.reading.status.fault;
@@ -158,19 +153,18 @@ void Finish(const Coordination& fleet, PositionerIndex i) {
   }
   fleet.units.SetPhase(i, kReady);
   fleet.ledger.alarms().End(AlarmName::kUnitFault, i, {});
-  fleet.units.Report(
-      i, record.reading.short_of_its_end ? UnitEventKind::kStopped : UnitEventKind::kReady);
+  fleet.units.Report(i, ended_short ? UnitEventKind::kStopped : UnitEventKind::kReady);
 }
 
 /// Closes the open move, for which others may have to stop.
 void EndOpenMove(const Coordination& fleet, PositionerIndex i, IntentEnd end) {
   UnitRecord& record = fleet.units[i];
   const bool fault = record.reading.status.state == UnitState::kFault;
-  const bool of_earlier_run = IsOfEarlierRun(fleet, i);
+  const bool of_earlier_run = HasEarlierMove(fleet, i);
   fleet.ledger.EndIntent(record.view.serial,
                          end == IntentEnd::kStopped && fault ? IntentEnd::kFault : end);
-  record.reading.short_of_its_end = end != IntentEnd::kArrived;
-  if (of_earlier_run && record.reading.short_of_its_end) EndedEarly(fleet, i);
+  record.motion.ended_short = end != IntentEnd::kArrived;
+  if (of_earlier_run && record.motion.ended_short) EndedEarly(fleet, i);
   // The `done` was lost, but the unit stands short of its end without a fault, and nothing but a
   // stop leaves it there.
   if (end == IntentEnd::kStopped && !fault && record.motion.runs_freely)
@@ -197,11 +191,15 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
                                     Name(result.knowledge[0].witness) + ", " + result.reason);
 }
 
-/// A unit that was resumed does not tell of its restart any more, so that is stored first: the
-/// daemon may end at any time.
-void ResumeWhenStored(const Coordination& fleet, PositionerIndex i) {
-  if (fleet.ledger.committed_through() >= *fleet.units[i].reading.resumes_after)
-    fleet.requests.Ask(i, StatusRequest{.resume = true});
+/// The unit is read anew, and resumed with that, when the store has what follows from its restart:
+/// the daemon may end at any time, and the unit does not speak of it again. A row that the store
+/// refuses is never there.
+void IdentifyWhenStored(const Coordination& fleet, PositionerIndex i) {
+  const UnitRecord& record = fleet.units[i];
+  if (!record.trouble.not_kept.empty())
+    Unfit(fleet, i);
+  else if (fleet.ledger.committed_through() >= *record.reading.stored_by)
+    Identify(fleet, i);
   else
     fleet.timers.Set(i, kNever);  // until WakeStored
 }
@@ -237,16 +235,19 @@ void Concluded(const Coordination& fleet, PositionerIndex i) {
     fleet.units.SetPhase(i, kSettling);
     return;
   }
+  if (reading.not_resumed) {
+    SettlePlace(fleet, i, store);
+    record.reading.stored_by = fleet.ledger.batch_now();
+    fleet.units.awaiting_store.push_back(i);
+    return IdentifyWhenStored(fleet, i);
+  }
   if (!IsReadable(fleet, i)) {
     view.knowledge = {};  // its vectors are not the host's: no count of it is a place
     Unfit(fleet, i);
     return;
   }
   SettlePlace(fleet, i, store);
-  if (!reading.status.restarted && !reading.status.host_lost) return Finish(fleet, i);
-  const bool notes = !fleet.out().rows.empty();
-  record.reading.resumes_after = fleet.ledger.batch_now() - (notes ? 0u : 1u);
-  ResumeWhenStored(fleet, i);
+  Finish(fleet, i);
 }
 
 /// The unit answers and cannot be used: its identity alone is asked from now on.
@@ -295,11 +296,14 @@ void OnNoSerial(const Coordination& fleet, PositionerIndex i) {
 HostMessage FirstQuestion() { return StepQuestion(0, false); }
 
 void AskNext(const Coordination& fleet, PositionerIndex i) {
-  const Reading& reading = fleet.units[i].reading;
-  if (reading.step < kSteps) {
-    fleet.requests.Ask(i, StepQuestion(reading.step, IsResumedAtOnce(fleet, i)));
-  } else if (reading.resumes_after) {
-    ResumeWhenStored(fleet, i);
+  const UnitRecord& record = fleet.units[i];
+  const Reading& reading = record.reading;
+  const bool resumes =
+      !fleet.ledger.intents.contains(record.view.serial) && record.trouble.not_kept.empty();
+  if (reading.stored_by) {
+    IdentifyWhenStored(fleet, i);
+  } else if (reading.step < (reading.not_resumed ? kStepsOfPlace : kSteps)) {
+    fleet.requests.Ask(i, StepQuestion(reading.step, resumes));
   } else {
     Concluded(fleet, i);
   }
@@ -318,28 +322,28 @@ void Identify(const Coordination& fleet, PositionerIndex i) {
 }
 
 void WakeStored(const Coordination& fleet) {
-  for (std::uint32_t n = 0; n < fleet.units.size(); ++n) {
-    const UnitRecord& record = fleet.units[{n}];
-    if (record.view.phase == kIdentifying && record.reading.resumes_after &&
-        !record.request.question)
-      fleet.timers.Set({n}, fleet.now());
-  }
+  std::erase_if(fleet.units.awaiting_store, [&](PositionerIndex i) {
+    const UnitRecord& record = fleet.units[i];
+    const std::optional<std::uint64_t>& batch = record.reading.stored_by;
+    if (record.view.phase != kIdentifying || !batch) return true;
+    const bool is_over =
+        fleet.ledger.committed_through() >= *batch || !record.trouble.not_kept.empty();
+    if (is_over && !record.request.question) fleet.timers.Set(i, fleet.now());
+    return is_over;
+  });
 }
 
 void OnStatusRead(const Coordination& fleet, PositionerIndex i, const StatusReply& status) {
-  Reading& reading = fleet.units[i].reading;
-  if (!reading.resumes_after) {
-    reading.status = status;
-    ++reading.step;
-    // A move that an earlier run staged and never started is taken back first.
-    if (status.state == UnitState::kStaging || status.state == UnitState::kArmed)
-      fleet.requests.Ask(i, Stop{});
-  } else if (status.restarted && !reading.status.restarted) {
-    Identify(fleet, i);
-  } else {
-    reading.status = status;
-    Finish(fleet, i);
-  }
+  UnitRecord& record = fleet.units[i];
+  if (record.reading.stored_by) return;
+  record.reading.status = status;
+  record.reading.not_resumed =
+      (status.restarted || status.host_lost) &&
+      (fleet.ledger.intents.contains(record.view.serial) || !record.trouble.not_kept.empty());
+  ++record.reading.step;
+  // A move that an earlier run staged and never started is taken back first.
+  if (status.state == UnitState::kStaging || status.state == UnitState::kArmed)
+    fleet.requests.Ask(i, Stop{});
 }
 
 void NameFault(const Coordination& fleet, PositionerIndex i, FaultCode fault) {
@@ -363,8 +367,8 @@ void Lose(const Coordination& fleet, PositionerIndex i, UnitPhase phase, const s
     const auto& drive = fleet.drive(i).axis;
     Know(fleet, i, InterruptedHull(intent->second, {drive[0].subdivision, drive[1].subdivision}),
          Origin::kMove);
-    if (before == kSettling) StopSettlingNear(fleet, i, "may stand in its way");
   }
+  if (phase == kSilent) LostOnItsWay(fleet, i);
   fleet.requests.Forget(i);
   record.locating.reset();
   record.motion.wants_start = false;

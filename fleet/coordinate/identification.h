@@ -1,8 +1,10 @@
 // An identification reads a unit anew and settles what is known of it. Seven questions in a row ask
 // for identity, status, two vectors, two carrier counts and the clock. The answers are put beside
-// the store (reconcile.h), and the unit is ready, foreign, in fault or lost afterwards. A unit that
-// has restarted, or lost the host, says so until it is resumed. An eighth question does that as
-// soon as what follows is stored.
+// the store (reconcile.h), and the unit is ready, foreign, in fault or lost afterwards.
+//
+// A unit that has restarted, or lost the host, says so until it is resumed, which the question for
+// its status does. An open move depends on that. Such a unit is read twice: up to its vectors and
+// not resumed, then anew, when the store has what follows.
 //
 // Cost: about 14 frames of 140 bits a unit, so 100 units take 0.2 s of a 1 Mbit/s bus.
 #pragma once

@@ -37,6 +37,7 @@ void Intend(const Coordination& fleet, const IntentRow& intent, const Pose& offs
   UnitView& view = fleet.units[i].view;
   (*round)[i].before = {view.knowledge, view.offset, intent.move};
   view.offset = offset;
+  fleet.units[i].motion.ended_early = false;
   fleet.ledger.intents[intent.serial] = intent;
   fleet.ledger.Note(intent);
   // The store must not claim the old place any more: the unit may be anywhere on its way.

@@ -65,6 +65,15 @@ void OnMotionStatus(const Coordination& fleet, PositionerIndex i, const StatusRe
   }
 }
 
+/// The unit has restarted, or lost the host, since it was read. Foreign hardware with an open move
+/// is not resumed, and says so for longer.
+bool IsNewlyLost(const UnitRecord& unit, const StatusReply& status) {
+  if (unit.view.phase != kForeign) return status.restarted || status.host_lost;
+  const bool knew_restart = unit.reading.not_resumed && unit.reading.status.restarted;
+  const bool knew_loss = unit.reading.not_resumed && unit.reading.status.host_lost;
+  return (status.restarted && !knew_restart) || (status.host_lost && !knew_loss);
+}
+
 /// A unit that restarted in mid-move answers a stop with the vectors in its FLASH, where the move
 /// began. The same answer comes from a unit that was stopped before its first step; its status says
 /// which one it is. A move may also end where it began, having made way for another unit.
@@ -143,7 +152,7 @@ void OnStatus(const Coordination& fleet, PositionerIndex i, const StatusReply& s
   }
   if (IsUnderWay(view.phase)) {
     OnMotionStatus(fleet, i, status);
-  } else if (status.restarted || status.host_lost ||
+  } else if (IsNewlyLost(record, status) ||
              (view.phase == kFault) != (status.state == UnitState::kFault)) {
     if (view.phase == kReady && status.state == UnitState::kFault) {
       Lose(fleet, i, kFault, std::string("reports fault ") + Name(status.fault));
@@ -191,6 +200,8 @@ void OnDone(const Coordination& fleet, PositionerIndex i, Done done, std::uint8_
     fleet.units.Report(i, UnitEventKind::kReady);
   } else if (view.phase == kReady && done.outcome == Outcome::kFault) {
     Lose(fleet, i, kFault, "reports a fault");
+  } else if (view.phase == kSilent && answer) {  // it hears, and is read at once
+    record.next_poll = fleet.now();
   }
 }
 

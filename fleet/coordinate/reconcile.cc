@@ -54,6 +54,8 @@ UnitKnowledge InterruptedHull(const IntentRow& intent,
 }
 
 Reconciled Reconcile(const UnitSays& unit, const StoreSays& store) {
+  if (store.intent && store.vector && unit.subdivision != store.vector->subdivision)
+    return Unknown("its subdivision differs from the stored one", IntentEnd::kInterrupted);
   if (store.intent) return AfterIntent(unit, *store.intent, store.homes);
   if (!store.vector) {
     if (unit.status.interrupted) return Unknown("power was lost in a move that is not on record");

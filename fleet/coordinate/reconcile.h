@@ -3,7 +3,8 @@
 //
 //   mark set                            cut by a power loss        interval over its hull
 //   mark clear, intent open, begun      ended by itself, unheard   reported
-//   the same, restarted, not at its end it lost mark or count, too interval over its hull
+//   the same, restarted, and FLASH      mark or count was lost     interval over its hull
+//     holds `from`, or not `to`           with the power
 //   the same of homing, not at its stop cut short                  interval over its hull
 //   mark clear, intent open, not begun  never began                reported, if FLASH holds `from`
 //   no intent, FLASH equals the store   as good as before          as stored

@@ -64,10 +64,12 @@ struct Reading {
   Pose position{};
   std::array<std::uint16_t, kAxisCount> subdivision{};
   std::array<std::int32_t, kAxisCount> counter1{};
-  // A unit that has restarted, or lost the host, says so until it is resumed. The host resumes it
-  // when this batch is stored, with what follows from that; none: it is not read to the end yet.
-  std::optional<std::uint64_t> resumes_after;
-  bool short_of_its_end = false;  // it stands short of the end of its last move
+  // A unit that has restarted, or lost the host, says so until it is resumed. Where an open move
+  // depends on that, it is read without being resumed first.
+  bool not_resumed = false;
+  // The batch with what follows from such a reading, after which the unit is read anew; none: it is
+  // not read to its end yet.
+  std::optional<std::uint64_t> stored_by;
 };
 
 /// Reasons for which a unit that answers is not moved.
@@ -93,6 +95,8 @@ struct MotionState {
   bool wants_start = false;  // began with the others, and its start is not known yet
   ClockMap::Instant began;   // as last reported
   bool runs_freely = false;  // set in motion, and not stopped by this host since
+  bool ended_short = false;  // of its end, and not reported yet
+  bool ended_early = false;  // its last move was one of an earlier run, and ended before its end
 };
 
 /// The sensors of a unit, being read or as read last.
@@ -120,8 +124,7 @@ struct UnitRecord {
   UnitTrouble trouble;
   MotionState motion;
   HostInstant next_poll{INT64_MIN};
-  bool asked_once = false;   // has had the chance to answer since start
-  bool ended_early = false;  // its move of an earlier run ended before its end
+  bool asked_once = false;  // has had the chance to answer since start
   ClockMap clock;
   bool clock_reported = false;  // an alarm has said that its clock is off by more than plans allow
   std::uint8_t protocol_version = kProtocolVersion;  // in its last identity

@@ -27,7 +27,8 @@ void NoAnswer(const Coordination& fleet, PositionerIndex i) {
     return;
   }
   fleet.requests.Forget(i);
-  record.asked_once = true;
+  const bool is_first = !std::exchange(record.asked_once, true);
+  if (is_first) LostOnItsWay(fleet, i);
   switch (record.view.phase) {
     case kAbsent:
     case kSilent:

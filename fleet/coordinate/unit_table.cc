@@ -96,7 +96,8 @@ std::string UnitTable::TroubleOf(PositionerIndex i) const {
         return "answers with serial number 0: its memory is lost, or it was never programmed";
       return view.phase == UnitPhase::kAbsent ? "has never answered" : "does not answer any more";
     case UnitPhase::kIdentifying:
-      return "is still being read";
+      return units_[i.value].reading.stored_by ? "waits until the store has its place"
+                                               : "is still being read";
     case UnitPhase::kMoving:
     case UnitPhase::kHoming:
     case UnitPhase::kSettling:

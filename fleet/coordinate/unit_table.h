@@ -73,6 +73,7 @@ class UnitTable {
   std::vector<BusRecord> buses;
   std::vector<UnitEvent> events;  // since the executor took them last
   std::unordered_map<SerialNumber, PositionerIndex> place_of;
+  std::vector<PositionerIndex> awaiting_store;  // may hold a unit that does not any more, or twice
 
  private:
   void Take(const StoredFleet& stored);

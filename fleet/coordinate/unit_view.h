@@ -26,7 +26,7 @@ enum class UnitPhase : std::uint8_t {
   kArmed,
   kMoving,
   kHoming,
-  kSettling,  // its motion should be over; being asked
+  kSettling,  // it still moves by itself, and is asked until it rests (settling.h)
   kFault,
   kSilent,  // answered before, does not now
 };

@@ -33,13 +33,14 @@ bool Concerns(const Round& round, double since_s, double left_s, const Ended& wh
 /// Units that may have ended, whose followers have not been looked at yet.
 using Open = std::vector<std::pair<PositionerIndex, Ended>>;
 
-/// The unit may be on its way. A unit that is not heard may hear.
+/// The unit may be on its way. A unit that was lost on its way may hear, and may be read again.
 bool MayMove(const Coordination& fleet, const Round& round, PositionerIndex i) {
   const UnitView& view = fleet.units[i].view;
   if (view.phase == UnitPhase::kMoving) return round.part(i) == Part::kMoving;
   const auto intent = fleet.ledger.intents.find(view.serial);
-  return view.phase == UnitPhase::kSilent && intent != fleet.ledger.intents.end() &&
-         intent->second.move == round.MoveOf(i);
+  const bool was_lost = view.phase == UnitPhase::kSilent || view.phase == UnitPhase::kSettling ||
+                        view.phase == UnitPhase::kIdentifying;
+  return was_lost && intent != fleet.ledger.intents.end() && intent->second.move == round.MoveOf(i);
 }
 
 void StopFollower(const Coordination& fleet, const Round& round, const UnitPlan::Follower& follower,

@@ -1,4 +1,5 @@
 // Parameters written to units of the in-process fleet, positions among them.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,6 +16,7 @@ namespace {
 
 using test::ExpectOthersArrive;
 using test::ExpectStoreTellsTheTruth;
+using test::HasAlarm;
 using test::InProcessFleet;
 using test::RunIntoMotion;
 using test::Small;
@@ -50,19 +52,40 @@ TEST(Configuration, ParameterIsSetWhenTheUnitSaysSo) {
   EXPECT_EQ(silent.error->text, "unit 4 did not answer: it may have taken the value or not");
 }
 
-// The units have restarted, and the store cannot take what follows.
+// A unit restarted in mid-move, and the store cannot take what follows.
 TEST(Configuration, ParameterOfAUnitThatIsNotResumedYetWaitsForTheStore) {
   InProcessFleet fleet(Small(45));
+  fleet.ApplyRandom(45);
+  RunIntoMotion(&fleet, Seconds(1));
+  const PositionerIndex i = SomebodyMoving(&fleet);
+  fleet.world().disturb().PowerCut(fleet.id(i.value));
+  fleet.Restart();
   fleet.storage.fails = true;
-  fleet.Run(Seconds(1));
-  ASSERT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kIdentifying);
-  fleet.Send({7000, WriteParameterCommand{{3}, Axis::kTheta, Parameter::kRepeat, 54}});
+  fleet.world().disturb().PowerOn(fleet.id(i.value));
+  fleet.Run(Seconds(2));
+  ASSERT_EQ(fleet.coordinator().unit(i).phase, UnitPhase::kIdentifying);
+  fleet.Send({7000, WriteParameterCommand{i, Axis::kTheta, Parameter::kRepeat, 54}});
   fleet.Run(Seconds(1));
   EXPECT_FALSE(fleet.LastReply(7000));
   fleet.storage.fails = false;
-  fleet.Run(Seconds(2));
+  fleet.Run(Seconds(3));
   ASSERT_TRUE(fleet.LastReply(7000));
-  EXPECT_EQ(fleet.LastReply(7000)->text, "unit 4: theta repeat = 54");
+  EXPECT_THAT(fleet.LastReply(7000)->text, testing::HasSubstr("theta repeat = 54"));
+}
+
+// The daemon was away for longer than units wait for a host, and moves were open.
+TEST(Configuration, AUnitThatLostTheHostInMidMoveIsResumedAndTakesSettings) {
+  InProcessFleet fleet(Small(45));
+  fleet.ApplyRandom(45);
+  RunIntoMotion(&fleet, Seconds(1));
+  fleet.Freeze(Seconds(60), InProcessFleet::Heard::kLost);
+  fleet.Restart();
+  fleet.Run(Seconds(5));
+  for (std::uint32_t n = 0; n < fleet.layout().size(); ++n)
+    EXPECT_EQ(fleet.coordinator().unit({n}).phase, UnitPhase::kReady) << n;
+  EXPECT_EQ(Write(&fleet, {{3}, Axis::kTheta, Parameter::kRepeat, 54}).text,
+            "unit 4: theta repeat = 54");
+  EXPECT_FALSE(HasAlarm(fleet, "refuses"));
 }
 
 TEST(Configuration, ParameterIsTakenAfterTheQuestionThatIsOpen) {

@@ -8,17 +8,9 @@ std::optional<QueuedFrame> ArbitrationQueue::Take(HostInstant now, std::uint32_t
     later_.pop();
   }
   if (ready_.empty()) return std::nullopt;
-  std::vector<QueuedFrame> kept;
-  std::optional<QueuedFrame> best;
-  while (!best && !ready_.empty()) {
-    if (ready_.top().node() == passed_over) {
-      kept.push_back(ready_.top());
-    } else {
-      best = ready_.top();
-    }
-    ready_.pop();
-  }
-  for (const QueuedFrame& entry : kept) ready_.push(entry);
+  if (ready_.top().node() == passed_over) return ready_.TakeBestBut(passed_over);
+  std::optional<QueuedFrame> best = ready_.top();
+  ready_.pop();
   return best;
 }
 

@@ -71,6 +71,8 @@ class ArbitrationQueue {
   template <class Order>
   struct Heap : std::priority_queue<QueuedFrame, std::vector<QueuedFrame>, Order> {
     void MoveAllOf(std::uint32_t node, std::vector<QueuedFrame>* to);
+    /// The first frame of any other node. Cost: linear; a node that is off may have hundreds.
+    std::optional<QueuedFrame> TakeBestBut(std::uint32_t node);
   };
 
   Heap<LaterFirst> later_;
@@ -85,6 +87,20 @@ void ArbitrationQueue::Heap<Order>::MoveAllOf(std::uint32_t node, std::vector<Qu
   to->insert(to->end(), theirs, all.end());
   all.erase(theirs, all.end());
   std::make_heap(all.begin(), all.end(), this->comp);
+}
+
+template <class Order>
+std::optional<QueuedFrame> ArbitrationQueue::Heap<Order>::TakeBestBut(std::uint32_t node) {
+  std::vector<QueuedFrame>& all = this->c;
+  auto best = all.end();
+  for (auto entry = all.begin(); entry != all.end(); ++entry)
+    if (entry->node() != node && (best == all.end() || this->comp(*best, *entry))) best = entry;
+  if (best == all.end()) return std::nullopt;
+  const QueuedFrame taken = *best;
+  *best = all.back();
+  all.pop_back();
+  std::make_heap(all.begin(), all.end(), this->comp);
+  return taken;
 }
 
 }  // namespace focalfleet::sim

@@ -146,6 +146,17 @@ TEST(World, ADeadBusTakesOnlyItsUnitsWithIt) {
   EXPECT_TRUE(rig.Ask(0, 1, IdentifyRequest{}));
 }
 
+// A unit that goes on with an older copy of its FLASH has begun its move all the same.
+TEST(World, TruthTellsTheMoveThatBeganThoughFlashIsLost) {
+  Rig rig(FleetOf(1, 2));
+  ASSERT_EQ(rig.StageAndArm(0, 1, MakeMove(7, 3000, -2000)), Answer::kOk);
+  rig.Send(0, 255, Start{{7}, 0});
+  rig.RunWatched(Milliseconds(300));
+  rig.world().disturb().SpoilFlash(UnitId{1}, FlashDamage::kOldCounts);
+  EXPECT_EQ(rig.world().flash(UnitId{1}).last_begun, MoveId{0});
+  EXPECT_EQ(rig.world().Truth(UnitId{1}).last_move, MoveId{7});
+}
+
 TEST(World, AllMemorySurvivesAndNothingElseDoes) {
   WorldConfig config = FleetOf(2, 5);
   config.spread = Spread::kReal;
