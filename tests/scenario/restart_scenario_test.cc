@@ -2,11 +2,14 @@
 // or a homing is stopped. The store claims no place that is not true, and work can go on.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
+#include "protocol/wire/codec.h"
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/scenario/steps.h"
 #include "tests/support/seed.h"
@@ -185,30 +188,68 @@ TEST(Configuration, ARestartIsReportedUntilWhatFollowsIsStored) {
   ExpectStoreTellsTheTruth(fleet, "after the second run");
 }
 
+// Hardware with an open move answers at another place. Whether it has restarted is asked when it is
+// adopted or put back, so it goes on saying so, and that alone is no news.
+TEST(Configuration, ForeignHardwareWithAnOpenMoveIsReadOnce) {
+  InProcessFleet fleet(Small(51));
+  fleet.ApplyRandom(51);
+  RunIntoMotion(&fleet, Seconds(1));
+  const PositionerIndex i = SomebodyMoving(&fleet);
+  const PositionerIndex other{i.value == 0 ? 1u : 0u};
+  fleet.world().disturb().PowerCut(fleet.id(i.value));
+  fleet.Run(Seconds(60));
+  ASSERT_EQ(fleet.coordinator().unit(i).phase, UnitPhase::kSilent);
+  fleet.world().disturb().faults(fleet.id(other.value))->foreign_serial =
+      fleet.coordinator().unit(i).bound_serial;
+  fleet.world().disturb().PowerCut(fleet.id(other.value));
+  fleet.Run(Seconds(1));
+  fleet.world().disturb().PowerOn(fleet.id(other.value));
+  fleet.Run(Seconds(15));
+  ASSERT_EQ(fleet.coordinator().unit(other).phase, UnitPhase::kForeign);
+  std::vector<OutFrame> sent;
+  fleet.sent = &sent;
+  fleet.Run(Seconds(60));
+  const auto asked = std::ranges::count_if(sent, [&](const OutFrame& frame) {
+    const auto message = DecodeHost(frame.frame);
+    return message && std::holds_alternative<IdentifyRequest>(message->message) &&
+           message->address.node == fleet.layout().unit(other).node &&
+           frame.bus == fleet.layout().unit(other).bus;
+  });
+  EXPECT_EQ(asked, 0) << "its identity is known";
+}
+
 // The plan of units that an earlier run has sent off is gone: where one ends early, those near it
-// stop.
+// stop. A unit may end before the next run has heard it, and then be silent.
 TEST(Configuration, UnitsOfAnEarlierRunStopForOneThatEndsEarly) {
-  for (const bool silent : {false, true}) {
+  struct Case {
+    bool silent;
+    bool before;  // it ends before the run begins
+    const char* what;
+  };
+  for (const auto& [silent, before, what] :
+       {Case{false, false, " has ended early"}, Case{true, false, " is not heard"},
+        Case{true, true, " does not answer"}}) {
     InProcessFleet fleet(Small(49));
     fleet.ApplyRandom(49);
     RunIntoMotion(&fleet, Seconds(1));
-    fleet.Restart();
-    fleet.Run(Seconds(1));
     const PositionerIndex first = SomebodyMoving(&fleet);
+    if (before) fleet.world().disturb().PowerCut(fleet.id(first.value));
+    fleet.Restart();
+    fleet.Run(Milliseconds(200));  // all that answer have been read
     std::vector<std::size_t> near;
     for (const PositionerIndex j : fleet.layout().neighbours(first))
       if (fleet.world().Truth(std::size_t{j.value}).state == UnitState::kMoving)
         near.push_back(j.value);
     ASSERT_GE(near.size(), 2u) << "nobody moves near it";
-    if (silent)
+    if (silent && !before)
       fleet.world().disturb().PowerCut(fleet.id(first.value));
-    else
+    else if (!silent)
       fleet.world().disturb().RaiseFault(fleet.id(first.value), FaultCode::kDriver);
-    fleet.Run(Milliseconds(1300));
+    fleet.Run(before ? Seconds(2) : Milliseconds(1100));
     for (const std::size_t n : near)
-      EXPECT_NE(fleet.world().Truth(n).state, UnitState::kMoving) << "row " << n << " goes on";
-    const std::string name = "unit " + std::to_string(fleet.id(first.value).value);
-    EXPECT_TRUE(HasAlarm(fleet, name + (silent ? " is not heard" : " has ended early")));
+      EXPECT_NE(fleet.world().Truth(n).state, UnitState::kMoving) << "row " << n << what;
+    EXPECT_TRUE(HasAlarm(fleet, "unit " + std::to_string(fleet.id(first.value).value) + what));
+    fleet.world().disturb().PowerOn(fleet.id(first.value));
     fleet.Run(Seconds(90));
     ExpectStoreTellsTheTruth(fleet, "at the end");
   }

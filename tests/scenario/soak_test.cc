@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "daemon/journal/fields.h"
 #include "daemon/journal/step_record.h"
@@ -204,6 +205,25 @@ TEST(Judge, NothingIsAcknowledgedByAProcessThatDoesNotStart) {
     judge.LifeBegins();
     EXPECT_EQ(judge.broken().empty(), !begins);
   }
+}
+
+// A small week: what grows with the number of configurations would show. The audit alone is kept
+// for ever.
+TEST(Week, MemoryStoreAndDescriptorsDoNotGrow) {
+  constexpr std::size_t kAuditOfACommand = 1500;
+  std::vector<WeekSizes> sizes;
+  const NightResult result =
+      Night(DrawSeed(1, {.units = 3, .faults = false}), {.keep_days = 2})
+          .RunWeek({.configurations = 140}, [&](const WeekSizes& each) { sizes.push_back(each); });
+  for (const std::string& broken : result.broken) ADD_FAILURE() << broken;
+  ASSERT_EQ(sizes.size(), 140u);
+  EXPECT_EQ(sizes.back().night, 7u);
+  EXPECT_EQ(result.lives, 7u);
+  const WeekSizes& middle = sizes[79];  // the end of the fourth night: two nights are pruned
+  EXPECT_LT(sizes.back().memory, middle.memory * 11 / 10);
+  EXPECT_LT(sizes.back().store, middle.store + 60 * kAuditOfACommand);
+  EXPECT_LE(sizes.back().descriptors, middle.descriptors);
+  EXPECT_GT(middle.store, sizes[19].store);
 }
 
 TEST(StepRecord, ReadsBackWhatItWrote) {
