@@ -36,7 +36,9 @@ Draws DrawSeed(std::uint64_t seed, const DrawLimits& limits) {
   const double share = rng.Below(3) == 0 ? 0.08 : rng.Uniform(0.15, 0.5);
   for (std::size_t site = 0; site < kFaultSites; ++site) {
     Rng own = Rng::Stream(seed, "soak site", site);
-    draws.armed[site] = limits.faults && own.Uniform() < share;
+    const bool exists = draws.camera || site < Index(FaultSite::kCameraDead) ||
+                        site > Index(FaultSite::kCameraOtherField);
+    draws.armed[site] = limits.faults && own.Uniform() < share && exists;
     draws.period[site] = SecondsOf(LogUniform(&own, 5, 80));
     draws.chance[site] = LogUniform(&own, 1e-5, 1e-2);
   }

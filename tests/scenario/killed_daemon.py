@@ -24,7 +24,7 @@ PATIENCE_S = 300
 UNITS_PER_BUS = 100
 STORE_BYTES = 192 << 20
 LAG_VECTORS = 6  # of a rotor at rest behind its field, with rounding
-SEEN_VECTORS = 400  # a place that the camera measured, at worst near the folded arm
+SEEN_VECTORS = 400  # a place that the camera measured, away from the stretched arm
 KNOWN, MEASURED = 1, 4  # witness: from here on there are limits; as a camera saw it
 # Deadlines are in the fleet's time, but the time that real processes need does not shrink with it.
 CONFIG = """
