@@ -29,7 +29,6 @@ constexpr double kSeen_mm = 0.04;
 /// A rotor at its stop is ahead of or behind a field that turns on by as much, and the daemon takes
 /// the way of an open move for so much wider.
 constexpr double kJumpVectors = 60;
-constexpr DurationNs kStopWithin = Milliseconds(150);
 /// A fault that kept a stop from a unit may lead to contact so long after it.
 constexpr DurationNs kContactAfter = Seconds(60);
 constexpr std::size_t kReportedMax = 64;
@@ -37,10 +36,6 @@ constexpr std::size_t kReportedMax = 64;
 constexpr DurationNs kMoveStale = Seconds(600);
 /// A row may be so much older than its commit, where the disk fails.
 constexpr DurationNs kRowHeld = Seconds(30);
-
-bool Moves(const sim::UnitTruth& truth) {
-  return truth.powered && (truth.state == UnitState::kMoving || truth.state == UnitState::kHoming);
-}
 
 }  // namespace
 
@@ -51,6 +46,8 @@ Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* trouble
       store_(disk,
              [this](const std::string& rule, const std::string& what) { Broken(rule, what); }),
       seen_(plant->layout().size()),
+      stops_(plant, troubles,
+             [this](const std::string& rule, const std::string& what) { Broken(rule, what); }),
       motion_(plant, troubles, draws.rail_motors * MotorAsMeasured_W(),
               [this](const std::string& rule, const std::string& what) { Broken(rule, what); }) {
   const auto units = plant->layout().units();
@@ -153,12 +150,6 @@ void Judge::Published(const StatusBatch& status) {
   }
 }
 
-void Judge::StopOrdered(HostInstant now, std::optional<UnitId> unit) {
-  for (std::size_t row = 0; row < seen_.size(); ++row)
-    if (!unit || plant_->layout().units()[row].id == *unit)
-      seen_[row].must_rest = std::min(seen_[row].must_rest, now + kStopWithin);
-}
-
 void Judge::Queues(std::size_t batches, std::span<const ShellFacts::Bus> buses) {
   constexpr std::size_t kBatchesMax = 20'000;
   if (batches > kBatchesMax) Broken("bound", fmt::format("{} batches wait", batches));
@@ -175,7 +166,7 @@ void Judge::Look(HostInstant now) {
     truths.push_back(plant_->world().Truth(row));
     LookAtStarts(row, truths.back());
     LookAtPlace(row, truths.back());
-    LookAtStop(row, truths.back());
+    stops_.Look(now, row, truths.back());
   }
   if (now > forget_at_) {
     forget_at_ = now + kMoveStale;
@@ -194,6 +185,7 @@ void Judge::LookAtStarts(std::size_t row, const sim::UnitTruth& truth) {
   seen.begun_twice = truth.begun_twice;
   if (truth.moves_begun == seen.moves_begun) return;
   seen.moves_begun = truth.moves_begun;
+  stops_.LookAtStart(row, truth);
   const auto allowed = allowed_.find({truth.id.value, truth.last_move.value});
   if (allowed == allowed_.end())
     Broken("start", fmt::format("unit {} began move {} without a durable intent", truth.id.value,
@@ -296,18 +288,6 @@ void Judge::LookAtFibre(std::size_t row, const sim::UnitTruth& truth, const Stor
   if (off_mm > kSeen_mm)
     Broken("place", fmt::format("the fibre of unit {} is {:.3f} mm from its measured place",
                                 truth.id.value, off_mm));
-}
-
-void Judge::LookAtStop(std::size_t row, const sim::UnitTruth& truth) {
-  Seen& seen = seen_[row];
-  if (now_ < seen.must_rest) return;
-  const HostInstant ordered = seen.must_rest - kStopWithin;
-  seen.must_rest = kNever;
-  const bool reached = ordered > troubles_->host && ordered > troubles_->buses[BusOf(row)] &&
-                       ordered > troubles_->deaf[row];
-  if (reached && Moves(truth) && truth.began < ordered)
-    Broken("stop", fmt::format("unit {} still moves {} ms after a stop", truth.id.value,
-                               kStopWithin.ns / 1'000'000));
 }
 
 void Judge::LookForContact(std::span<const sim::UnitTruth> truths) {

@@ -9,12 +9,14 @@
 //   place      A stored exact place is where the unit is. An open intent or an interval holds it.
 //   reported   A place reported to readers is one that the store has acknowledged.
 //   contact    No two arms touch, unless a fault kept every stop from one of them.
-//   stop       Within a bound after a stop was ordered, no reachable unit moves.
+//   stop       Within a bound after a stop was ordered, no reachable unit moves; and after a stop
+//   of
+//              all none begins before the next command.
 //   twice      No move is begun twice.
 //   bound      Queues stay within their bounds.
 //
-// The store and motion have judges of their own (store_judge.h, motion_judge.h): what survives a
-// kill; starts of one move apart, followers, power.
+// The store, stops and motion have judges of their own (store_judge.h, stop_judge.h,
+// motion_judge.h): what survives a kill; stops; starts of one move apart, followers, power.
 #pragma once
 
 #include <array>
@@ -32,6 +34,7 @@
 #include "daemon/soak/draws.h"
 #include "daemon/soak/motion_judge.h"
 #include "daemon/soak/plant.h"
+#include "daemon/soak/stop_judge.h"
 #include "daemon/soak/store_judge.h"
 #include "daemon/soak/troubles.h"
 #include "daemon/status/shell_facts.h"
@@ -55,7 +58,7 @@ class Judge {
   void Sends(BusId bus, const CanFrame& frame);
   /// Looks at the true state; call it ten times a second or more often.
   void Look(HostInstant now);
-  void StopOrdered(HostInstant now, std::optional<UnitId> unit);
+  [[nodiscard]] StopJudge& stops() { return stops_; }
   /// The store judge's.
   void LifeBegins() { store_.LifeBegins(); }
   void LifeHasBegun();
@@ -78,12 +81,10 @@ class Judge {
   struct Seen {
     std::uint32_t moves_begun = 0;
     std::uint32_t begun_twice = 0;
-    HostInstant must_rest = kNever;  // after a stop
   };
   void LookAtStarts(std::size_t row, const sim::UnitTruth& truth);
   void LookAtPlace(std::size_t row, const sim::UnitTruth& truth);
   void LookAtFibre(std::size_t row, const sim::UnitTruth& truth, const StoredPlace& place);
-  void LookAtStop(std::size_t row, const sim::UnitTruth& truth);
   void LookForContact(std::span<const sim::UnitTruth> truths);
   void NoteBlind(std::span<const Row> rows);
   void NoteSeen(const VectorRow& vector);
@@ -104,6 +105,7 @@ class Judge {
   std::map<Move, HostInstant> allowed_;  // by a durable intent, and when that was seen last
   std::set<Move> blind_;  // whose intent was acknowledged while the unit's place was not exact
   std::vector<Seen> seen_;
+  StopJudge stops_;
   MotionJudge motion_;
   std::vector<std::vector<std::size_t>> near_;
   std::set<std::pair<std::size_t, std::size_t>> touching_;

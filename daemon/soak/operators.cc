@@ -39,11 +39,14 @@ void Operators::Act(HostInstant now) {
 
 std::uint64_t Operators::Ask(const std::string& verb, Json args) {
   const std::uint64_t client = ++client_;
-  open_[client] = {.verb = verb};
+  open_[client] = {.verb = verb, .asked = HostInstant{ReadVirtualNs()}};
   if (args.contains("unit_id")) open_[client].unit = UnitId{args["unit_id"].get<std::uint32_t>()};
   if (args.contains("unit_ids") && args["unit_ids"].size() == 1)
     open_[client].unit = UnitId{args["unit_ids"][0].get<std::uint32_t>()};
-  if (verb == "stop") parts_.judge->StopOrdered(HostInstant{ReadVirtualNs()}, open_[client].unit);
+  if (verb == "apply" || verb == "home" || verb == "retarget" || verb == "measure")
+    parts_.judge->stops().MotionCommanded(HostInstant{ReadVirtualNs()});
+  if (verb == "stop")
+    parts_.judge->stops().Ordered(HostInstant{ReadVirtualNs()}, open_[client].unit);
   parts_.put(client, EncodeRequest({client, verb, std::move(args)}));
   return client;
 }
@@ -148,7 +151,10 @@ bool Operators::Hear(std::uint64_t client, std::string_view line, bool last) {
 
 /// A change that is answered with success is in the store.
 void Operators::CheckAnswer(const Open& open, const ControlAnswer& answer) {
-  if (answer.kind != ControlAnswer::Kind::kResult || !open.unit) return;
+  if (answer.kind != ControlAnswer::Kind::kResult) return;
+  if (open.verb == "stop" && !open.unit)
+    parts_.judge->stops().AllStopped(open.asked, HostInstant{ReadVirtualNs()});
+  if (!open.unit) return;
   if (open.verb != "enable" && open.verb != "disable") return;
   const auto& units = parts_.judge->acknowledged().units;
   const auto unit = units.find(open.unit->value);

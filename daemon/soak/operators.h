@@ -54,6 +54,7 @@ class Operators {
  private:
   struct Open {
     std::string verb;
+    HostInstant asked = {};
     std::optional<UnitId> unit;
     bool gone = false;
   };

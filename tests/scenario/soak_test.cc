@@ -214,16 +214,16 @@ TEST(Week, MemoryStoreAndDescriptorsDoNotGrow) {
   std::vector<WeekSizes> sizes;
   const NightResult result =
       Night(DrawSeed(1, {.units = 3, .faults = false}), {.keep_days = 2})
-          .RunWeek({.configurations = 140}, [&](const WeekSizes& each) { sizes.push_back(each); });
+          .RunWeek({.configurations = 70}, [&](const WeekSizes& each) { sizes.push_back(each); });
   for (const std::string& broken : result.broken) ADD_FAILURE() << broken;
-  ASSERT_EQ(sizes.size(), 140u);
+  ASSERT_EQ(sizes.size(), 70u);
   EXPECT_EQ(sizes.back().night, 7u);
   EXPECT_EQ(result.lives, 7u);
-  const WeekSizes& middle = sizes[79];  // the end of the fourth night: two nights are pruned
+  const WeekSizes& middle = sizes[39];  // the end of the fourth night: two nights are pruned
   EXPECT_LT(sizes.back().memory, middle.memory * 11 / 10);
-  EXPECT_LT(sizes.back().store, middle.store + 60 * kAuditOfACommand);
+  EXPECT_LT(sizes.back().store, middle.store + 30 * kAuditOfACommand);
   EXPECT_LE(sizes.back().descriptors, middle.descriptors);
-  EXPECT_GT(middle.store, sizes[19].store);
+  EXPECT_GT(middle.store, sizes[9].store);
 }
 
 TEST(StepRecord, ReadsBackWhatItWrote) {
