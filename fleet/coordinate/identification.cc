@@ -61,16 +61,10 @@ void Bind(const Coordination& fleet, PositionerIndex i) {
   fleet.ledger.Note(BindingRow{fleet.layout.unit(i).id, view.serial, replaced});
 }
 
-/// The place is free, and so is the unit.
-bool IsFree(const Coordination& fleet, PositionerIndex i) {
-  const UnitView& view = fleet.units[i].view;
-  return view.bound_serial.value == 0 && !fleet.units.place_of.contains(view.serial);
-}
-
 /// True where the unit is bound to its place, or is bound to it here. False: it is foreign there.
 bool Belongs(const Coordination& fleet, PositionerIndex i) {
   UnitView& view = fleet.units[i].view;
-  if (IsFree(fleet, i)) {
+  if (view.bound_serial.value == 0 && !fleet.units.place_of.contains(view.serial)) {
     Bind(fleet, i);
   } else if (view.bound_serial != view.serial) {
     view.knowledge = {};

@@ -9,7 +9,9 @@
 namespace focalfleet::sim {
 
 /// Share of the family-wise rate that each search of what is left has: structures, exposures, fine
-/// structure, clusters, and neighbours pushed apart.
+/// structure, clusters, and neighbours pushed apart. All five together err at most 1.5 times as
+/// often as that rate. Half and double of it for neighbours pushed apart: docs/diagnosis.md. For
+/// the other four they have not been measured.
 inline constexpr double kShareOfSearch = 0.3;
 
 /// ln P(chi-square of `dof` degrees of freedom > x). 0 for x <= 0. Pre: dof > 0.

@@ -52,8 +52,9 @@ void StepFit(Fit* fit);
 /// Repeats steps, noise and weights in turn, `rounds` at most, until the amplitudes rest.
 void SettleFit(Fit* fit, int rounds);
 
-/// Fits a model whose terms or events were changed. Amplitudes are linear: a step and two rounds of
-/// SettleFit suffice.
+/// Fits a model whose terms or events were changed: a step, as amplitudes are linear, and two
+/// rounds of SettleFit at most for weights and noise. Other numbers of rounds have not been
+/// measured.
 void FitAnew(Fit* fit);
 
 /// Lets the zeros differ from homing to homing, and fits them.

@@ -109,6 +109,12 @@ TEST(Reconcile, OtherSubdivisionIsUnknown) {
   says.subdivision = {96, 48};
   EXPECT_FALSE(
       IsPlace(Reconcile(says, {.vector = Stored(Exactly(Witness::kReported, kFrom))}).knowledge));
+  // With a move open, too: counts of another subdivision are no place on its way.
+  UnitSays moved = Unit(false, kOurs, kTo);
+  moved.subdivision = {96, 48};
+  const Reconciled result = Reconcile(moved, {.vector = Stored(Intent().hull), .intent = Intent()});
+  EXPECT_EQ(result.knowledge, UnitKnowledge{});
+  EXPECT_EQ(result.intent_end, IntentEnd::kInterrupted);
 }
 
 }  // namespace
