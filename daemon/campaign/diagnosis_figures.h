@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "daemon/report/plot.h"
-#include "sim/campaigns/diagnosis/diagnosis.h"
-#include "sim/campaigns/diagnosis/residual_views.h"
+#include "sim/campaigns/diagnosis/decide/diagnosis.h"
+#include "sim/campaigns/diagnosis/use/residual_views.h"
 
 namespace focalfleet {
 

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "daemon/campaign/verdict_sentence.h"
-#include "sim/campaigns/diagnosis/decide.h"
-#include "sim/campaigns/diagnosis/left_by.h"
+#include "sim/campaigns/diagnosis/decide/decide.h"
+#include "sim/campaigns/diagnosis/use/left_by.h"
 #include "sim/campaigns/effects/empirical.h"
 
 namespace focalfleet {

@@ -13,7 +13,7 @@
 #include <string_view>
 
 #include "protocol/base/result.h"
-#include "sim/campaigns/diagnosis/diagnosis.h"
+#include "sim/campaigns/diagnosis/decide/diagnosis.h"
 
 namespace focalfleet {
 

@@ -9,8 +9,8 @@
 #include "daemon/campaign/diagnosis_figures.h"
 #include "daemon/campaign/verdict_sentence.h"
 #include "daemon/report/page.h"
-#include "sim/campaigns/diagnosis/decide.h"
-#include "sim/campaigns/diagnosis/next_moves.h"
+#include "sim/campaigns/diagnosis/decide/decide.h"
+#include "sim/campaigns/diagnosis/design/next_moves.h"
 
 namespace focalfleet {
 namespace {

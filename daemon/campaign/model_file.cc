@@ -11,10 +11,10 @@
 #include <span>
 #include <vector>
 
-#include "sim/campaigns/diagnosis/geometry_check.h"
-#include "sim/campaigns/planting/planted.h"
+#include "sim/campaigns/diagnosis/check/geometry_check.h"
 #include "sim/campaigns/effects/empirical.h"
 #include "sim/campaigns/effects/registry.h"
+#include "sim/campaigns/planting/planted.h"
 
 namespace focalfleet {
 namespace {

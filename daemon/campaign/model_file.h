@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "protocol/base/result.h"
-#include "sim/campaigns/diagnosis/left_by.h"
-#include "sim/campaigns/diagnosis/model.h"
+#include "sim/campaigns/diagnosis/model/model.h"
+#include "sim/campaigns/diagnosis/use/left_by.h"
 
 namespace focalfleet {
 

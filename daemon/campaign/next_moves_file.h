@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "protocol/base/result.h"
-#include "sim/campaigns/diagnosis/ahead.h"
+#include "sim/campaigns/diagnosis/design/ahead.h"
 
 namespace focalfleet {
 

@@ -8,7 +8,7 @@
 
 #include "daemon/campaign/cause_words.h"
 #include "daemon/campaign/diagnosis_files.h"
-#include "sim/campaigns/diagnosis/decide.h"
+#include "sim/campaigns/diagnosis/decide/decide.h"
 
 namespace focalfleet {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/campaigns/diagnosis/diagnosis.h"
+#include "sim/campaigns/diagnosis/decide/diagnosis.h"
 
 namespace focalfleet {
 

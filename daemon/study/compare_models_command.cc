@@ -7,7 +7,7 @@
 
 #include "daemon/cli/table.h"
 #include "daemon/study/measured_campaign.h"
-#include "sim/campaigns/diagnosis/compare_models.h"
+#include "sim/campaigns/diagnosis/use/compare_models.h"
 
 namespace focalfleet::cli {
 namespace {

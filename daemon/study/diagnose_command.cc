@@ -23,9 +23,9 @@
 #include "daemon/study/study.h"
 #include "daemon/tables/read_table.h"
 #include "protocol/base/rng.h"
-#include "sim/campaigns/diagnosis/plain_geometry.h"
-#include "sim/campaigns/planting/planted.h"
+#include "sim/campaigns/diagnosis/model/plain_geometry.h"
 #include "sim/campaigns/effects/registry.h"
+#include "sim/campaigns/planting/planted.h"
 
 namespace focalfleet::cli {
 namespace {

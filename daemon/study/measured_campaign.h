@@ -9,7 +9,7 @@
 #include "daemon/cli/context.h"
 #include "protocol/base/result.h"
 #include "sim/campaigns/campaign/campaign.h"
-#include "sim/campaigns/diagnosis/model.h"
+#include "sim/campaigns/diagnosis/model/model.h"
 
 namespace focalfleet::cli {
 

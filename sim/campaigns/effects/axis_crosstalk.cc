@@ -37,8 +37,7 @@ Effect MakeAxisCrosstalk() {
               "shaft, or a bearing's drag. Move the axes one after the other to see it.",
           .list = ListAxisCrosstalk,
           .apply = ApplyAxisCrosstalk,
-          .of_poses_alone = EachForm,
-          .traits = {.families = {Family::kAngles}, .is_slow_wave = true}};
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

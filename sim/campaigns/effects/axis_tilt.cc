@@ -53,8 +53,7 @@ Effect MakeAxisTilt() {
               "distortion of the camera looks alike on one unit, not on a plate full of them.",
           .list = ListAxisTilt,
           .apply = ApplyAxisTilt,
-          .of_poses_alone = EachForm,
-          .traits = {.families = {Family::kAngles, Family::kImage}, .is_slow_wave = true}};
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

@@ -47,7 +47,8 @@ Effect MakeBacklash() {
           .of_poses_alone = EachForm,
           .continuous_shape = true,
           .amplitude_is_shape = true,
-          .traits = {.families = {Family::kMoves}}};
+          .distortions = kOfMoves,
+          .traits = {.by_direction = true}};
 }
 
 }  // namespace focalfleet::sim

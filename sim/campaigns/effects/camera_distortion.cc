@@ -58,8 +58,7 @@ Effect MakeCameraDistortion() {
               "displacements that grow with the third power of the distance from its centre, "
               "the same at every exposure.",
           .list = ListCameraDistortion,
-          .apply = ApplyCameraDistortion,
-          .traits = {.families = {Family::kImage}}};
+          .apply = ApplyCameraDistortion};
 }
 
 }  // namespace focalfleet::sim

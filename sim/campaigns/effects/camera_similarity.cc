@@ -1,5 +1,5 @@
 // Camera similarity: the image shifts once, as when the camera was touched. The image terms
-// (sim/campaigns/diagnosis/image.h) describe motion of the image from exposure to exposure.
+// (sim/campaigns/diagnosis/terms/image.h) describe motion of the image from exposure to exposure.
 #include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet::sim {
@@ -43,7 +43,7 @@ Effect MakeCameraSimilarity() {
           .list = ListCameraSimilarity,
           .apply = ApplyCameraSimilarity,
           .continuous_shape = true,
-          .traits = {.families = {Family::kImage}, .is_of_camera = true}};
+          .traits = {.is_of_camera = true}};
 }
 
 }  // namespace focalfleet::sim

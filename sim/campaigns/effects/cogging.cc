@@ -48,8 +48,7 @@ Effect MakeCogging() {
           .list = ListCogging,
           .apply = ApplyCogging,
           // At one drive level the pull of the poles is a ripple like that of the phases.
-          .passes_for = {"phase_imbalance"},
-          .traits = {.families = {Family::kRotor}}};
+          .passes_for = {"phase_imbalance"}};
 }
 
 }  // namespace focalfleet::sim

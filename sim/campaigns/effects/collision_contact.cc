@@ -43,7 +43,7 @@ Effect MakeCollisionContact() {
           .continuous_shape = true,
           .amplitude_low = 0,
           .amplitude_high = 1.5,
-          .traits = {.families = {}, .acts_on_others = true}};
+          .traits = {.acts_on_others = true}};
 }
 
 }  // namespace focalfleet::sim

@@ -129,7 +129,7 @@ Effect MakeCommandQuantisation() {
           .amplitude_low = 0,
           .amplitude_high = 1.5,
           .amplitude_least = 0.5,
-          .traits = {.families = {Family::kMoves, Family::kAngles}}};
+          .distortions = kOfMoves};
 }
 
 }  // namespace focalfleet::sim

@@ -26,8 +26,7 @@ Effect MakeEccentricity() {
               "own.",
           .list = ListEccentricity,
           .apply = ApplyEccentricity,
-          .of_poses_alone = EachForm,
-          .traits = {.families = {Family::kAngles}, .is_slow_wave = true}};
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

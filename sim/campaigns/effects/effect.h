@@ -86,6 +86,23 @@ struct Template {
 
 using Templates = std::vector<Template>;
 
+/// The ways in which the true shape of an effect may differ from the library's: factors of the
+/// effect's own error, each without the part that is the error itself.
+enum class Distortion : std::uint8_t {
+  kOwn,        // another amplitude in each unit
+  kBend,       // more or less than in proportion where the error is large
+  kDrive,      // by the amplitude of the drive
+  kDirection,  // by the direction of the axis' last move
+  kCosine,     // by the axis' angle
+  kSine,
+};
+inline constexpr Distortion kOfAnyEffect[] = {Distortion::kOwn, Distortion::kBend,
+                                              Distortion::kDrive};
+/// The ways of effects that moves make: friction, play and load differ with direction and angle.
+inline constexpr Distortion kOfMoves[] = {Distortion::kOwn,    Distortion::kBend,
+                                          Distortion::kDrive,  Distortion::kDirection,
+                                          Distortion::kCosine, Distortion::kSine};
+
 struct Effect {
   std::string_view cause;  // id of docs/diagnosis.md
   std::string_view amplitude_unit;
@@ -120,6 +137,8 @@ struct Effect {
   // its campaigns intervals of 95 % cover 26 of 29 amplitudes, 24 with half of it or none, 27 with
   // twice as much.
   double discrepancy = 0.08;
+  // The ways in which it differs (diagnosis/model/discrepancy.h).
+  std::span<const Distortion> distortions = kOfAnyEffect;
   // Whether the moves can distinguish this shape. nullptr: any moves can.
   bool (*shows)(const Template&, const CampaignFacts&) = nullptr;
   // Causes whose trace this one may pass for where one of `needs` is missing from the campaign.

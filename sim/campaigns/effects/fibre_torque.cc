@@ -56,7 +56,7 @@ Effect MakeFibreTorque() {
           .apply = ApplyFibreTorque,
           .of_poses_alone = EachForm,
           .continuous_shape = true,
-          .traits = {.families = {Family::kMoves, Family::kAngles}}};
+          .distortions = kOfMoves};
 }
 
 }  // namespace focalfleet::sim

@@ -42,7 +42,7 @@ Effect MakeFrictionWindup() {
           .apply = ApplyFrictionWindup,
           .of_poses_alone = EachForm,
           .continuous_shape = true,
-          .traits = {.families = {Family::kMoves}}};
+          .distortions = kOfMoves};
 }
 
 }  // namespace focalfleet::sim

@@ -40,7 +40,7 @@ Effect MakeGravitySag() {
           .apply = ApplyGravitySag,
           // Without elevations a plate that sags is a shift of the image.
           .passes_for = {"camera_similarity"},
-          .traits = {.families = {Family::kImage}, .image_motion = MotionOfImage::kAlongALine}};
+          .traits = {.image_motion = MotionOfImage::kAlongALine}};
 }
 
 }  // namespace focalfleet::sim

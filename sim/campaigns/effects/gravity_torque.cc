@@ -57,8 +57,7 @@ Effect MakeGravityTorque() {
           .apply = ApplyGravityTorque,
           .continuous_shape = true,
           // At one elevation the side of the gears goes with the angle alone.
-          .passes_for = {"eccentricity"},
-          .traits = {.families = {Family::kAngles}}};
+          .passes_for = {"eccentricity"}};
 }
 
 }  // namespace focalfleet::sim

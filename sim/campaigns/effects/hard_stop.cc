@@ -53,8 +53,7 @@ Effect MakeHardStop() {
           // A stop holds an axis back and never pulls. At 1 the axis stands still there; more is
           // for a stop between two of the listed places.
           .amplitude_low = 0,
-          .amplitude_high = 1.5,
-          .traits = {.families = {Family::kAngles}}};
+          .amplitude_high = 1.5};
 }
 
 }  // namespace focalfleet::sim

@@ -59,10 +59,10 @@ Effect MakeLoadAngleLag() {
           .list = ListLoadAngleLag,
           .apply = ApplyLoadAngleLag,
           .continuous_shape = true,
+          .distortions = kOfMoves,
           .shows = ShowsLoadAngleLag,
           // At one drive level a lag is play.
-          .passes_for = {"backlash"},
-          .traits = {.families = {Family::kMoves}}};
+          .traits = {.by_direction = true}};
 }
 
 }  // namespace focalfleet::sim

@@ -94,8 +94,8 @@ Effect MakeModeThreshold() {
           .apply = ApplyModeThreshold,
           .of_poses_alone = ReadsNoMode,
           .continuous_shape = true,
-          .shows = ShowsModeThreshold,
-          .traits = {.families = {Family::kMoves}}};
+          .distortions = kOfMoves,
+          .shows = ShowsModeThreshold};
 }
 
 }  // namespace focalfleet::sim

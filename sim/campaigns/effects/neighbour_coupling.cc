@@ -69,7 +69,7 @@ Effect MakeNeighbourCoupling() {
               "between the two and the cube of their distance.",
           .list = ListNeighbourCoupling,
           .apply = ApplyNeighbourCoupling,
-          .traits = {.families = {Family::kRotor}, .acts_on_others = true}};
+          .traits = {.acts_on_others = true}};
 }
 
 }  // namespace focalfleet::sim

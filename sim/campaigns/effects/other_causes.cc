@@ -1,5 +1,6 @@
 #include "sim/campaigns/effects/other_causes.h"
 
+#include <algorithm>
 #include <map>
 
 #include "sim/campaigns/effects/registry.h"
@@ -7,15 +8,9 @@
 namespace focalfleet::sim {
 
 const Traits& TraitsOf(std::string_view cause) {
-  static const std::map<std::string_view, Traits> others = {
-      {kZeroOffset, {.families = {}, .is_static = true, .is_found_exactly = true}},
-      {kBaseOffset, {.families = {}, .is_static = true, .is_found_exactly = true}},
-      {kArmLength, {.families = {}, .is_static = true, .is_found_exactly = true}},
-      {kIdentitySwap, {.families = {}, .is_found_exactly = true}},
-      {kLostCommand, {.families = {}, .is_found_exactly = true}},
-      {kStepLoss, {.families = {}, .is_found_exactly = true}},
-      {kSensorBias, {.families = {}, .is_found_exactly = true}},
-      {kAirTurbulence, {.families = {Family::kImage}, .is_of_air = true}}};
+  static const std::map<std::string_view, Traits> others = {{kZeroOffset, {.is_static = true}},
+                                                            {kBaseOffset, {.is_static = true}},
+                                                            {kArmLength, {.is_static = true}}};
   static const Traits none;
   if (const auto other = others.find(cause); other != others.end()) return other->second;
   const Effect* effect = FindEffect(cause);

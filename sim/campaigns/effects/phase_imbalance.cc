@@ -56,8 +56,7 @@ Effect MakePhaseImbalance() {
               "voltages: a ripple of one, two or six periods a motor turn. That of gains does not "
               "know the drive level, the others fall with it.",
           .list = ListPhaseImbalance,
-          .apply = ApplyPhaseImbalance,
-          .traits = {.families = {Family::kRotor}}};
+          .apply = ApplyPhaseImbalance};
 }
 
 }  // namespace focalfleet::sim

@@ -29,8 +29,7 @@ Effect MakePinionRunout() {
               "that nothing but a gear of its own tells them apart.",
           .list = ListPinionRunout,
           .apply = ApplyPinionRunout,
-          .of_poses_alone = EachForm,
-          .traits = {.families = {Family::kAngles}}};
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

@@ -49,8 +49,7 @@ Effect MakePlateExpansion() {
           .continuous_shape = true,
           // Without temperatures a plate that grows is a camera that scales.
           .passes_for = {"camera_similarity"},
-          .traits = {.families = {Family::kNight, Family::kImage},
-                     .image_motion = MotionOfImage::kGrows}};
+          .traits = {.image_motion = MotionOfImage::kGrows}};
 }
 
 }  // namespace focalfleet::sim

@@ -63,8 +63,7 @@ Effect MakePlateGradient() {
           // plate's gradient.
           .amplitude_low = -0.01,
           .amplitude_high = 0.01,
-          .traits = {.families = {Family::kNight, Family::kImage},
-                     .image_motion = MotionOfImage::kBends}};
+          .traits = {.image_motion = MotionOfImage::kBends}};
 }
 
 }  // namespace focalfleet::sim

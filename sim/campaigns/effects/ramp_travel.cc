@@ -47,7 +47,7 @@ Effect MakeRampTravel() {
           .of_poses_alone = EachForm,
           .amplitude_low = -10,
           .amplitude_high = 10,
-          .traits = {.families = {Family::kMoves}}};
+          .distortions = kOfMoves};
 }
 
 }  // namespace focalfleet::sim

@@ -84,10 +84,10 @@ Effect MakeRelaxation() {
           .list = ListRelaxation,
           .apply = ApplyRelaxation,
           .continuous_shape = true,
+          .distortions = kOfMoves,
           .shows = ShowsRelaxation,
           // At one delay a creep that is not over is play.
-          .passes_for = {"backlash"},
-          .traits = {.families = {Family::kMoves}}};
+          .traits = {.by_direction = true}};
 }
 
 }  // namespace focalfleet::sim

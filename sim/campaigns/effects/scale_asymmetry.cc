@@ -34,7 +34,7 @@ Effect MakeScaleAsymmetry() {
           .list = ListScaleAsymmetry,
           .apply = ApplyScaleAsymmetry,
           .of_poses_alone = EachForm,
-          .traits = {.families = {Family::kMoves}}};
+          .distortions = kOfMoves};
 }
 
 }  // namespace focalfleet::sim

@@ -78,8 +78,7 @@ Effect MakeSelfHeating() {
               "constant of minutes. Pause, or spread the moves.",
           .list = ListSelfHeating,
           .apply = ApplySelfHeating,
-          .continuous_shape = true,
-          .traits = {.families = {Family::kNight}}};
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

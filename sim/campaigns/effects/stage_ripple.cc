@@ -31,8 +31,7 @@ Effect MakeStageRipple() {
               "of its stage (11.3, 48.6 or 208 a turn with a pinion stage behind it).",
           .list = ListStageRipple,
           .apply = ApplyStageRipple,
-          .of_poses_alone = EachForm,
-          .traits = {.families = {Family::kAngles}, .is_ripple = true}};
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

@@ -103,10 +103,10 @@ Effect MakeStartSkew() {
           .list = ListStartSkew,
           .apply = ApplyStartSkew,
           .continuous_shape = true,
+          .distortions = kOfMoves,
           .shows = ShowsStartSkew,
           // Without places in the order a late start is play.
-          .passes_for = {"backlash"},
-          .traits = {.families = {Family::kMoves}}};
+          .traits = {.by_direction = true}};
 }
 
 }  // namespace focalfleet::sim

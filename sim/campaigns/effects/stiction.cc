@@ -64,7 +64,7 @@ Effect MakeStiction() {
           .amplitude_low = 0,
           .amplitude_high = 1.2,
           .amplitude_least = 0.3,
-          .traits = {.families = {Family::kMoves}}};
+          .distortions = kOfMoves};
 }
 
 }  // namespace focalfleet::sim

@@ -56,8 +56,8 @@ Effect MakeSupplyDrift() {
           .list = ListSupplyDrift,
           .apply = ApplySupplyDrift,
           // Over a night the air cools as the supply sinks.
-          .passes_for = {"thermal_backlash"},
-          .traits = {.families = {Family::kNight}, .by_direction = true}};
+          .distortions = kOfMoves,
+          .traits = {.by_direction = true}};
 }
 
 }  // namespace focalfleet::sim

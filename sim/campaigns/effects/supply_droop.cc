@@ -144,8 +144,8 @@ Effect MakeSupplyDroop() {
           .apply = ApplySupplyDroop,
           .continuous_shape = true,
           // Without counts of the movers a sag is play.
-          .passes_for = {"backlash"},
-          .traits = {.families = {Family::kMoves}}};
+          .distortions = kOfMoves,
+          .traits = {.by_direction = true}};
 }
 
 }  // namespace focalfleet::sim

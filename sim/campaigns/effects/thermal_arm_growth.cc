@@ -45,8 +45,7 @@ Effect MakeThermalArmGrowth() {
           .apply = ApplyThermalArmGrowth,
           .continuous_shape = true,
           // Without temperatures arms that grow over a night are warmed by their motors.
-          .passes_for = {"self_heating"},
-          .traits = {.families = {Family::kNight}}};
+          .passes_for = {"self_heating"}};
 }
 
 }  // namespace focalfleet::sim

@@ -57,8 +57,8 @@ Effect MakeThermalBacklash() {
           .list = ListThermalBacklash,
           .apply = ApplyThermalBacklash,
           // Over a night the supply sinks as the air cools.
-          .passes_for = {"supply_drift"},
-          .traits = {.families = {Family::kMoves, Family::kNight}, .by_direction = true}};
+          .distortions = kOfMoves,
+          .traits = {.by_direction = true}};
 }
 
 }  // namespace focalfleet::sim

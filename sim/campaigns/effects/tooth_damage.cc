@@ -66,8 +66,7 @@ Effect MakeToothDamage() {
           .of_poses_alone = EachForm,
           .continuous_shape = true,
           .own_shape = true,
-          .shows = ShowsToothDamage,
-          .traits = {.families = {Family::kAngles}, .is_bump = true}};
+          .shows = ShowsToothDamage};
 }
 
 }  // namespace focalfleet::sim

@@ -43,8 +43,7 @@ Effect MakeToothMesh() {
               "all around or deeper on one side.",
           .list = ListToothMesh,
           .apply = ApplyToothMesh,
-          .of_poses_alone = EachForm,
-          .traits = {.families = {Family::kAngles}, .is_ripple = true}};
+          .of_poses_alone = EachForm};
 }
 
 }  // namespace focalfleet::sim

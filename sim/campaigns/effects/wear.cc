@@ -73,8 +73,7 @@ Effect MakeWear() {
           .apply = ApplyWear,
           .one_is_enough = true,
           .amplitude_low = -20,  // a gear that falls apart
-          .amplitude_high = 20,
-          .traits = {.families = {Family::kNight}}};
+          .amplitude_high = 20};
 }
 
 }  // namespace focalfleet::sim

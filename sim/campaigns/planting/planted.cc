@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "protocol/base/rng.h"
-#include "sim/campaigns/diagnosis/model.h"
+#include "sim/campaigns/diagnosis/model/model.h"
 #include "sim/campaigns/effects/registry.h"
 #include "sim/campaigns/planting/planted_faults.h"
 

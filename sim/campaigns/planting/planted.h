@@ -13,7 +13,7 @@
 
 #include "protocol/base/result.h"
 #include "sim/campaigns/campaign/campaign.h"
-#include "sim/campaigns/diagnosis/ahead.h"
+#include "sim/campaigns/diagnosis/design/ahead.h"
 
 namespace focalfleet::sim {
 

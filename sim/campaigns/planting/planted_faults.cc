@@ -11,7 +11,7 @@
 
 #include "protocol/base/rng.h"
 #include "protocol/base/units.h"
-#include "sim/campaigns/diagnosis/exchanged.h"
+#include "sim/campaigns/diagnosis/terms/exchanged.h"
 #include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {

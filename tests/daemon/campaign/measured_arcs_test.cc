@@ -9,8 +9,8 @@
 
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/files/text_file.h"
-#include "sim/campaigns/diagnosis/diagnosis.h"
-#include "sim/campaigns/diagnosis/next_moves.h"
+#include "sim/campaigns/diagnosis/decide/diagnosis.h"
+#include "sim/campaigns/diagnosis/design/next_moves.h"
 
 namespace focalfleet {
 namespace {

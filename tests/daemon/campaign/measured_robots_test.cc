@@ -10,8 +10,8 @@
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/files/text_file.h"
 #include "fleet/files/csv.h"
-#include "sim/campaigns/diagnosis/axis_classes.h"
-#include "sim/campaigns/diagnosis/diagnosis.h"
+#include "sim/campaigns/diagnosis/decide/diagnosis.h"
+#include "sim/campaigns/diagnosis/use/axis_classes.h"
 
 namespace focalfleet {
 namespace {

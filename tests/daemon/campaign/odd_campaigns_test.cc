@@ -21,7 +21,7 @@
 #include "daemon/campaign/next_moves_file.h"
 #include "daemon/campaign/verdict_sentence.h"
 #include "fleet/files/layout_file.h"
-#include "sim/campaigns/diagnosis/decide.h"
+#include "sim/campaigns/diagnosis/decide/decide.h"
 #include "tests/sim/campaigns/campaign/odd_places.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 

@@ -1,5 +1,5 @@
 // Robots are simulated axis by axis, and their classes read from the places alone.
-#include "sim/campaigns/diagnosis/axis_classes.h"
+#include "sim/campaigns/diagnosis/use/axis_classes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

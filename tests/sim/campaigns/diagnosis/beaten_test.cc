@@ -1,5 +1,5 @@
 // Names are compared with an empirical term that does better.
-#include "sim/campaigns/diagnosis/beaten.h"
+#include "sim/campaigns/diagnosis/search/beaten.h"
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "sim/campaigns/diagnosis/fleet_groups.h"
+#include "sim/campaigns/diagnosis/score/fleet_groups.h"
 #include "sim/campaigns/effects/harmonic.h"
 #include "sim/campaigns/effects/registry.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"

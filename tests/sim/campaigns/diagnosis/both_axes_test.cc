@@ -1,5 +1,5 @@
 // Causes with one amplitude for both axes are compared with those that have one on each.
-#include "sim/campaigns/diagnosis/both_axes.h"
+#include "sim/campaigns/diagnosis/search/both_axes.h"
 
 #include <gmock/gmock.h>
 

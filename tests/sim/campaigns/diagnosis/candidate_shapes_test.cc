@@ -1,5 +1,5 @@
 // Shapes between the listed ones, and shapes of units' own.
-#include "sim/campaigns/diagnosis/candidate_shapes.h"
+#include "sim/campaigns/diagnosis/search/candidate_shapes.h"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // Tails of the distributions that names are judged by are compared with sums by hand.
-#include "sim/campaigns/diagnosis/chances.h"
+#include "sim/campaigns/diagnosis/score/chances.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/compare_models.h"
+#include "sim/campaigns/diagnosis/use/compare_models.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/decide.h"
+#include "sim/campaigns/diagnosis/decide/decide.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -64,6 +64,22 @@ TEST(Decide, RivalsShareWhatTheDoubtLeaves) {
   EXPECT_NEAR(posterior[0] + posterior[1] + posterior[2], 1, 1e-12);
 }
 
+TEST(Decide, WhatAnythingCouldBeIsUnknown) {
+  const auto decided = [](int rivals) {
+    CauseFound cause = NameOf(5);
+    cause.axis = "phi";
+    for (int k = 0; k < rivals; ++k) cause.candidates.push_back("rival" + std::to_string(k));
+    return Found({cause}, {});
+  };
+  EXPECT_EQ(decided(6).causes.size(), 1u);
+  const Diagnosis diagnosis = decided(7);
+  EXPECT_TRUE(diagnosis.causes.empty());
+  ASSERT_EQ(diagnosis.unknown.size(), 1u);
+  EXPECT_EQ(diagnosis.unknown[0].channel, "phi: what 8 causes could be");
+  EXPECT_EQ(diagnosis.unknown[0].size_um, 5);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown);
+}
+
 TEST(Decide, GivesTheVerdict) {
   CauseFound ambiguous = NameOf(5);
   ambiguous.candidates.push_back("stiction");
@@ -71,6 +87,39 @@ TEST(Decide, GivesTheVerdict) {
   EXPECT_EQ(Found({NameOf(5)}, {}).verdict, Verdict::kExplained);
   EXPECT_EQ(Found({NameOf(5), ambiguous}, {}).verdict, Verdict::kAmbiguous);
   EXPECT_EQ(Found({}, {{.size_um = 1}}).verdict, Verdict::kUnknown);
+}
+
+std::vector<std::string> CandidatesBeside(std::string_view cause, const char* untested,
+                                          const char* why,
+                                          std::vector<std::string> cannot_be = {}) {
+  std::vector<CauseFound> causes = {CauseNamed(cause)};
+  causes[0].cannot_be = std::move(cannot_be);
+  AddUntested({{untested, why}}, &causes);
+  return causes[0].candidates;
+}
+
+TEST(Decide, WhereAColumnIsMissingItsCauseIsACandidateOfWhatItPassesFor) {
+  constexpr const char* kNoDrive = "column drive_amplitude is missing";
+  EXPECT_THAT(CandidatesBeside("phase_imbalance", "cogging", kNoDrive),
+              ElementsAre("phase_imbalance", "cogging"));
+  EXPECT_THAT(CandidatesBeside("backlash", "cogging", kNoDrive), ElementsAre("backlash"));
+  EXPECT_THAT(CandidatesBeside("camera_similarity", "plate_expansion", "column temp_C is missing"),
+              ElementsAre("camera_similarity", "plate_expansion"));
+  EXPECT_THAT(CandidatesBeside("camera_similarity", "plate_expansion", "the moves never excite it"),
+              ElementsAre("camera_similarity"));
+  EXPECT_THAT(CandidatesBeside("camera_similarity", "gravity_sag",
+                               "column elevation_deg is missing", {"gravity_sag"}),
+              ElementsAre("camera_similarity"));
+}
+
+TEST(Decide, WhatTurnsItsSignWithTheMovePassesForItsLikeWithoutItsColumn) {
+  constexpr const char* kNoDelay = "column delay_s is missing";
+  for (const char* named : {"backlash", "load_angle_lag", "supply_droop", "thermal_backlash"})
+    EXPECT_THAT(CandidatesBeside(named, "relaxation", kNoDelay), ElementsAre(named, "relaxation"));
+  EXPECT_THAT(CandidatesBeside("eccentricity", "relaxation", kNoDelay),
+              ElementsAre("eccentricity"));
+  EXPECT_THAT(CandidatesBeside("backlash", "wear", "column cycles_theta is missing"),
+              ElementsAre("backlash"));
 }
 
 }  // namespace

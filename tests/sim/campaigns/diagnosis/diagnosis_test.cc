@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/diagnosis.h"
+#include "sim/campaigns/diagnosis/decide/diagnosis.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-#include "sim/campaigns/diagnosis/homings.h"
+#include "sim/campaigns/diagnosis/terms/homings.h"
 #include "sim/campaigns/effects/registry.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 

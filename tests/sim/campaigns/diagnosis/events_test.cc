@@ -1,5 +1,5 @@
 // Steps in single units' angles are slips by whole turns of the rotor, or moves that were not made.
-#include "sim/campaigns/diagnosis/events.h"
+#include "sim/campaigns/diagnosis/terms/events.h"
 
 #include <gmock/gmock.h>
 

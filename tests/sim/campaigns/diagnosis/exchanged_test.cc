@@ -1,5 +1,5 @@
 // Units that make each other's moves.
-#include "sim/campaigns/diagnosis/exchanged.h"
+#include "sim/campaigns/diagnosis/terms/exchanged.h"
 
 #include <gmock/gmock.h>
 

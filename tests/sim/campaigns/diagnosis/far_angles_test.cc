@@ -1,5 +1,5 @@
 // Angles that reach a place, and residuals of errors that are arcs.
-#include "sim/campaigns/diagnosis/far_angles.h"
+#include "sim/campaigns/diagnosis/model/far_angles.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Structure that varies too fast for a smooth curve, and outliers that cluster at one place.
-#include "sim/campaigns/diagnosis/fine_structure.h"
+#include "sim/campaigns/diagnosis/check/fine_structure.h"
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/campaigns/diagnosis/outliers.h"
+#include "sim/campaigns/diagnosis/terms/outliers.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {

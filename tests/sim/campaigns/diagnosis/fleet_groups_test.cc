@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/fleet_groups.h"
+#include "sim/campaigns/diagnosis/score/fleet_groups.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/gain.h"
+#include "sim/campaigns/diagnosis/check/gain.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

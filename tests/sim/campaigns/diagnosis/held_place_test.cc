@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "sim/campaigns/diagnosis/whiten.h"
+#include "sim/campaigns/diagnosis/model/whiten.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {

@@ -1,5 +1,5 @@
 // The whole image moves by its own unrest, by the air, or with a column of the table.
-#include "sim/campaigns/diagnosis/image.h"
+#include "sim/campaigns/diagnosis/terms/image.h"
 
 #include <gmock/gmock.h>
 
@@ -10,8 +10,8 @@
 #include <numbers>
 
 #include "protocol/base/rng.h"
-#include "sim/campaigns/diagnosis/image_followed.h"
-#include "sim/campaigns/diagnosis/term_trace.h"
+#include "sim/campaigns/diagnosis/model/term_trace.h"
+#include "sim/campaigns/diagnosis/terms/image_followed.h"
 #include "sim/campaigns/effects/registry.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 

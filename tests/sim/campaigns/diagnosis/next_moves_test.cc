@@ -1,5 +1,5 @@
 // Moves that are proposed to separate causes are compared with their effect.
-#include "sim/campaigns/diagnosis/next_moves.h"
+#include "sim/campaigns/diagnosis/design/next_moves.h"
 
 #include <gmock/gmock.h>
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "sim/campaigns/diagnosis/multi_start.h"
-#include "sim/campaigns/diagnosis/select.h"
+#include "sim/campaigns/diagnosis/search/multi_start.h"
+#include "sim/campaigns/diagnosis/search/select.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {

@@ -1,5 +1,5 @@
 // Empirical terms for structure that is planted outside the library.
-#include "sim/campaigns/diagnosis/patch.h"
+#include "sim/campaigns/diagnosis/use/patch.h"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // Fibres that touch push each other apart, whatever law the push follows.
-#include "sim/campaigns/diagnosis/pushed_apart.h"
+#include "sim/campaigns/diagnosis/terms/pushed_apart.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
 // Roundings to steps that no list has.
-#include "sim/campaigns/diagnosis/quick_look.h"
+#include "sim/campaigns/diagnosis/search/quick_look.h"
 
 #include <gmock/gmock.h>
 
 #include <map>
 
-#include "sim/campaigns/diagnosis/select.h"
+#include "sim/campaigns/diagnosis/search/select.h"
 #include "sim/campaigns/effects/registry.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 

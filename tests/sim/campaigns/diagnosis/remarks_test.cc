@@ -1,5 +1,5 @@
 // Oddities of the data are reported, and are no evidence.
-#include "sim/campaigns/diagnosis/remarks.h"
+#include "sim/campaigns/diagnosis/decide/remarks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/residual_views.h"
+#include "sim/campaigns/diagnosis/use/residual_views.h"
 
 #include <gtest/gtest.h>
 

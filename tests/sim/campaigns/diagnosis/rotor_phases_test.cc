@@ -1,5 +1,5 @@
 // Rotors of neighbours pull at each other, and nobody knows where they stand in their motors.
-#include "sim/campaigns/diagnosis/rotor_phases.h"
+#include "sim/campaigns/diagnosis/terms/rotor_phases.h"
 
 #include <gmock/gmock.h>
 

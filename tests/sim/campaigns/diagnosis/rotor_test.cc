@@ -7,7 +7,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "sim/campaigns/diagnosis/rotors.h"
+#include "sim/campaigns/diagnosis/search/rotors.h"
 #include "sim/campaigns/effects/registry.h"
 #include "sim/campaigns/effects/rotor_ways.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"

@@ -1,9 +1,9 @@
 // Scores of templates are sums over units, without the part that the model's shared terms explain.
-#include "sim/campaigns/diagnosis/score.h"
+#include "sim/campaigns/diagnosis/score/score.h"
 
 #include <numeric>
 
-#include "sim/campaigns/diagnosis/select.h"
+#include "sim/campaigns/diagnosis/search/select.h"
 #include "sim/campaigns/effects/registry.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 

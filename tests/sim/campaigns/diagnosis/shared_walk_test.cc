@@ -1,5 +1,5 @@
 // Common motion of all units while their noise remembers is compared with independent walks.
-#include "sim/campaigns/diagnosis/shared_walk.h"
+#include "sim/campaigns/diagnosis/check/shared_walk.h"
 
 #include <gmock/gmock.h>
 

@@ -1,9 +1,9 @@
 // Rest errors that an axis keeps until it moves leave no trace once they are whitened.
-#include "sim/campaigns/diagnosis/whiten.h"
+#include "sim/campaigns/diagnosis/model/whiten.h"
 
 #include <cmath>
 
-#include "sim/campaigns/diagnosis/fit.h"
+#include "sim/campaigns/diagnosis/model/fit.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {

@@ -1,5 +1,5 @@
 // Boards that report another temperature than they have, and boards that have another.
-#include "sim/campaigns/diagnosis/wrong_sensors.h"
+#include "sim/campaigns/diagnosis/terms/wrong_sensors.h"
 
 #include <gmock/gmock.h>
 

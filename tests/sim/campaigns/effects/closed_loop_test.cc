@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "protocol/base/rng.h"
-#include "sim/campaigns/diagnosis/far_angles.h"
-#include "sim/campaigns/planting/planted.h"
+#include "sim/campaigns/diagnosis/model/far_angles.h"
 #include "sim/campaigns/effects/registry.h"
+#include "sim/campaigns/planting/planted.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet::sim {

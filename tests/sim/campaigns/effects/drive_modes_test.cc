@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "sim/campaigns/diagnosis/left_by.h"
+#include "sim/campaigns/diagnosis/use/left_by.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 
 namespace focalfleet::sim {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "protocol/base/rng.h"
-#include "sim/campaigns/diagnosis/diagnosis.h"
-#include "sim/campaigns/diagnosis/fit.h"
+#include "sim/campaigns/diagnosis/decide/diagnosis.h"
+#include "sim/campaigns/diagnosis/model/fit.h"
 #include "sim/campaigns/planting/planted.h"
 
 namespace focalfleet::sim::test {

@@ -1,0 +1,106 @@
+#include "sim/campaigns/diagnosis/decide/decide.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include "sim/campaigns/effects/other_causes.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// Error rate of a name by itself: at most one in ten such names may be wrong. Half and double of
+// it: docs/diagnosis.md, Reliability.
+constexpr double kDoubtMax = 0.1;
+
+// The share of a structure's size in all that it and the name explain. Two errors of one size are
+// even odds: the name may be a part of the structure.
+double DoubtBeside(const CauseFound& cause, std::span<const UnknownFound> unknown) {
+  double square_um2 = 0;
+  for (const UnknownFound& one : unknown)
+    if (one.casts_doubt) square_um2 += one.size_um * one.size_um;
+  if (!(square_um2 > 0)) return 0;
+  const double unknown_um = std::sqrt(square_um2);
+  return unknown_um / (unknown_um + cause.size_um);
+}
+
+// A name that so many causes could have is none: what it explains is unknown. Sets of planted
+// campaigns have four names at most (half of it would make these unknown), or twenty and more.
+constexpr std::size_t kAnything = 8;
+
+void MoveNameless(Diagnosis* diagnosis) {
+  std::erase_if(diagnosis->causes, [&](const CauseFound& cause) {
+    if (cause.candidates.size() < kAnything) return false;
+    const bool of_an_axis = cause.axis == "theta" || cause.axis == "phi";
+    diagnosis->unknown.push_back({.covariate = of_an_axis ? cause.axis + "_cmd_deg" : "t_s",
+                                  .channel = (of_an_axis ? cause.axis + ": what " : "what ") +
+                                             std::to_string(cause.candidates.size()) +
+                                             " causes could be",
+                                  .p_value = std::exp(-cause.delta_log_likelihood),
+                                  .size_um = cause.size_um,
+                                  .delta_log_likelihood = cause.delta_log_likelihood});
+    return true;
+  });
+}
+
+Verdict VerdictOf(const Diagnosis& diagnosis) {
+  const auto is_ambiguous = [](const CauseFound& cause) { return cause.candidates.size() > 1; };
+  if (!diagnosis.unknown.empty()) return Verdict::kUnknown;
+  if (std::ranges::any_of(diagnosis.causes, is_ambiguous)) return Verdict::kAmbiguous;
+  return diagnosis.causes.empty() ? Verdict::kConsistent : Verdict::kExplained;
+}
+
+}  // namespace
+
+double DoubtOf(const CauseFound& cause, std::span<const UnknownFound> unknown) {
+  // Names without a rival where nothing was unknown, in 288 campaigns of three generators. Half and
+  // double of the doubt: docs/diagnosis.md, Reliability.
+  constexpr double kWrong = 5, kNames = 192;
+  constexpr double kAlone = (kWrong + 0.5) / (kNames + 1);  // the mean of Jeffreys' posterior
+  if (TraitsOf(cause.cause).is_static) return 0;  // no other cause is like it, and none was wrong
+  return 1 - (1 - kAlone) * (1 - DoubtBeside(cause, unknown));
+}
+
+std::vector<double> PosteriorOf(const CauseFound& cause) {
+  std::vector<double> weights;
+  for (const std::string& name : cause.candidates) {
+    const auto odds = cause.log_odds.find(name);
+    weights.push_back(name == kSomethingUnknown      ? 0
+                      : odds == cause.log_odds.end() ? 1
+                                                     : std::exp(odds->second));
+  }
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    weights[k] = cause.candidates[k] == kSomethingUnknown ? cause.doubt
+                                                          : weights[k] * (1 - cause.doubt) / sum;
+  return weights;
+}
+
+void AddUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes) {
+  for (const NotTestable& other : not_testable) {
+    const Effect* effect = FindEffect(other.cause);
+    if (effect == nullptr || !other.why.starts_with("column ")) continue;
+    const auto passes_for = [&](const std::string& name) {
+      return std::ranges::count(effect->passes_for, name) != 0 ||
+             (effect->traits.by_direction && TraitsOf(name).by_direction);
+    };
+    for (CauseFound& cause : *causes)
+      if (std::ranges::any_of(cause.candidates, passes_for) &&
+          std::ranges::count(cause.candidates, other.cause) == 0 &&
+          std::ranges::count(cause.cannot_be, other.cause) == 0)
+        cause.candidates.push_back(other.cause);
+  }
+}
+
+void Decide(Diagnosis* diagnosis) {
+  MoveNameless(diagnosis);
+  AddUntested(diagnosis->not_testable, &diagnosis->causes);
+  for (CauseFound& cause : diagnosis->causes) {
+    cause.doubt = DoubtOf(cause, diagnosis->unknown);
+    if (cause.doubt > kDoubtMax) cause.candidates.emplace_back(kSomethingUnknown);
+  }
+  diagnosis->verdict = VerdictOf(*diagnosis);
+}
+
+}  // namespace focalfleet::sim

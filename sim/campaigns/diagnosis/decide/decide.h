@@ -1,0 +1,37 @@
+// The decision: each name gets its probability, and a verdict follows. The data share a probability
+// out among the candidates that they do not separate. The rest is the doubt that none of them is
+// the cause. This doubt was counted on planted campaigns, and grows with what is unknown beside the
+// name. A name that is not nearly certain has "unknown" among its candidates.
+#pragma once
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "sim/campaigns/diagnosis/decide/diagnosis.h"
+
+namespace focalfleet::sim {
+
+/// The candidate of a name that may be a part of an unknown structure.
+inline constexpr std::string_view kSomethingUnknown = "unknown";
+
+/// The probability that none of the cause's names is right, beside these unknown structures: 0 for
+/// geometry, and 3 % where nothing is unknown. Beside a structure of size u a name of size n is in
+/// doubt by u / (u + n) more (docs/diagnosis.md, Reliability).
+double DoubtOf(const CauseFound& cause, std::span<const UnknownFound> unknown);
+
+/// The probability of each candidate. "unknown" has the cause's doubt, which is otherwise the rest
+/// of 1. Shape: (candidates).
+std::vector<double> PosteriorOf(const CauseFound& cause);
+
+/// Adds causes that were not tested for want of a column, where a candidate is what they pass for
+/// without it: another effect that turns its sign with the move by a column, or one that the
+/// effect names (Effect::passes_for).
+void AddUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes);
+
+/// Moves what eight and more causes could be into the unknown. Gives each cause its doubt, with
+/// "unknown" as its last candidate from 10 % on, and the diagnosis its verdict. Nothing changes
+/// either afterwards.
+void Decide(Diagnosis* diagnosis);
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,201 @@
+#include "sim/campaigns/diagnosis/terms/events.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/terms/exact_steps.h"
+#include "sim/campaigns/diagnosis/terms/slips.h"
+
+namespace focalfleet::sim {
+namespace {
+
+enum class StepKind { kTurns, kCommand, kBlocked };
+
+StepKind KindOf(const Fit& fit, const EventTerm& event) {
+  const double step = fit.facts->step_deg[event.axis][event.row];
+  if (std::abs(std::abs(event.step_deg) - std::abs(step)) < 1e-9) return StepKind::kCommand;
+  const double turns = event.step_deg * fit.model.units[event.unit].gear[event.axis] / 360;
+  return std::abs(turns - std::round(turns)) < 1e-6 ? StepKind::kTurns : StepKind::kBlocked;
+}
+
+}  // namespace
+
+std::size_t AddEvents(double family_wise, Fit* fit) {
+  const std::size_t units = fit->model.units.size();
+  std::vector<std::vector<EventTerm>> of_unit(units);
+  std::vector<CampaignUnit> geometry = fit->model.units;
+  const std::vector<UnitChunk> chunks = ChunksOf(units);
+  const auto take = [&] {
+    std::size_t added = 0;
+    for (auto& events : of_unit) {
+      for (const EventTerm& event : events) fit->model.events.push_back(event), ++added;
+      events.clear();
+    }
+    if (added == 0) return added;
+    fit->model.units = geometry;
+    UpdateResiduals(fit);
+    SettleFit(fit, 3);
+    return added;
+  };
+  fit->parallel(chunks.size(), [&](std::size_t chunk) {
+    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
+      of_unit[unit] = ExactSteps(*fit, unit, &geometry[unit]);
+  });
+  std::size_t added = take();
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    geometry = fit->model.units;
+    fit->parallel(chunks.size(), [&](std::size_t chunk) {
+      for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
+        of_unit[unit] = FindSlips(*fit, unit, family_wise);
+    });
+    const std::size_t slips = take();
+    added += slips;
+    if (slips == 0) break;
+  }
+  return added;
+}
+
+namespace {
+
+bool AnyHasMet(const Fit& fit) {
+  return std::ranges::any_of(fit.model.events,
+                             [&](const EventTerm& event) { return IsOfContact(fit, event); });
+}
+
+// The gap at which arms come to rest that have met. Below any gap where none have met, or where the
+// data do not show it. Arms that meet on their way may have targets far apart.
+double TouchingGap_mm(const Fit& fit) {
+  const FilledColumn* gap = fit.facts->Find(kArmGap);
+  std::vector<double> gaps_mm;
+  for (const EventTerm& event : fit.model.events)
+    if (gap != nullptr && IsOfContact(fit, event)) gaps_mm.push_back(gap->values[event.row]);
+  return gaps_mm.empty() ? -1
+                         : std::min(Median(std::move(gaps_mm)), kThickestArm * fit.facts->pitch_mm);
+}
+
+double SizeOf_um(const Fit& fit, const EventTerm& event) {
+  const CampaignUnit& unit = fit.model.units[event.unit];
+  const double lever_mm =
+      event.axis == kPhi ? unit.arm_mm[kPhi] : std::hypot(unit.arm_mm[0], unit.arm_mm[1]);
+  return 1e3 * lever_mm * std::abs(event.step_deg) * std::numbers::pi / 180;
+}
+
+struct Step {
+  EventTerm event;
+  double log_likelihood = 0;
+};
+
+CauseFound CauseOfSteps(const Fit& fit, std::string_view name, std::string_view paragraph,
+                        const std::vector<Step>& steps) {
+  CauseFound cause = CauseNamed(name);
+  cause.scope = "unit";
+  cause.amplitude_unit = kEvents;
+  std::set<std::uint32_t> units;
+  std::set<std::size_t> axes, moves;  // a lost move has an event of each axis
+  double square = 0;
+  for (const auto& [event, log_likelihood] : steps) {
+    cause.delta_log_likelihood += log_likelihood;
+    moves.insert(event.row);
+    units.insert(fit.model.units[event.unit].id);
+    axes.insert(event.axis);
+    square += std::pow(SizeOf_um(fit, event), 2);
+  }
+  cause.amplitude = static_cast<double>(moves.size());
+  cause.axis = axes.size() > 1 ? "both" : *axes.begin() == kTheta ? "theta" : "phi";
+  cause.units.assign(units.begin(), units.end());
+  cause.all_units = units.size() == fit.model.units.size();
+  cause.ci95[0] = cause.ci95[1] = cause.amplitude;
+  cause.size_um = std::sqrt(square / cause.amplitude);
+  cause.paragraph = paragraph;
+  return cause;
+}
+
+}  // namespace
+
+bool IsOfContact(const Fit& fit, const EventTerm& event) {
+  const auto reach = [](const CampaignUnit& unit) {
+    return unit.arm_mm[kTheta] + unit.arm_mm[kPhi];
+  };
+  const StepKind kind = KindOf(fit, event);
+  if (kind == StepKind::kCommand) return false;
+  const CampaignUnit& own = fit.model.units[event.unit];
+  const std::vector<std::uint32_t>& exposure = fit.facts->exposures.of_row;
+  // Two units that lost whole turns both slipped.
+  const auto has_met = [&](StepKind one, StepKind other) {
+    return other != StepKind::kCommand &&
+           (one == StepKind::kBlocked || other == StepKind::kBlocked);
+  };
+  return std::ranges::any_of(fit.model.events, [&](const EventTerm& other) {
+    const CampaignUnit& unit = fit.model.units[other.unit];
+    return exposure[other.row] == exposure[event.row] && other.unit != event.unit &&
+           has_met(kind, KindOf(fit, other)) &&
+           std::hypot(unit.base_x_mm - own.base_x_mm, unit.base_y_mm - own.base_y_mm) <
+               reach(unit) + reach(own);
+  });
+}
+
+std::vector<CauseFound> EventCauses(const Fit& fit) {
+  struct Named {
+    std::string_view name, paragraph;
+    std::vector<Step> events;
+  };
+  Named turns{kStepLoss,
+              "The rotor lost its field for whole motor turns: raise the drive, slow down, or look "
+              "for what blocks the axis; home the unit.",
+              {}};
+  Named commands{kLostCommand,
+                 "A whole move was not made, or made twice: look at the bus and its error "
+                 "counters.",
+                 {}};
+  Named contacts{kContact,
+                 "Two neighbours stopped short of their way in the same move, and stand off since: "
+                 "they have touched. Home both, and look at the plan of that move.",
+                 {}};
+  const bool any_has_met = AnyHasMet(fit);
+  // A unit that stopped short alone, where others have met, has pushed its neighbour too little to
+  // be seen. Some units that are stopped end whole turns short.
+  const double touching_mm = TouchingGap_mm(fit);
+  const auto has_met = [&](const EventTerm& event, StepKind kind) {
+    if (kind == StepKind::kBlocked) return any_has_met;
+    return IsOfContact(fit, event) ||
+           (touching_mm >= 0 && fit.facts->Find(kArmGap)->values[event.row] <= touching_mm);
+  };
+  const std::vector<double> log_likelihood = LogLikelihoodOfEvents(fit);
+  for (std::size_t k = 0; k < fit.model.events.size(); ++k) {
+    const Step step{fit.model.events[k], log_likelihood[k]};
+    const StepKind kind = KindOf(fit, step.event);
+    if (kind == StepKind::kCommand) {
+      commands.events.push_back(step);
+    } else if (has_met(step.event, kind)) {
+      contacts.events.push_back(step);
+    } else if (kind == StepKind::kTurns) {
+      turns.events.push_back(step);
+    }
+  }
+  std::vector<CauseFound> causes;
+  for (const Named* one : {&turns, &commands, &contacts})
+    if (!one->events.empty())
+      causes.push_back(CauseOfSteps(fit, one->name, one->paragraph, one->events));
+  return causes;
+}
+
+std::vector<UnknownFound> UnexplainedSteps(const Fit& fit) {
+  std::vector<UnknownFound> reported;
+  if (AnyHasMet(fit)) return reported;
+  for (const EventTerm& event : fit.model.events)
+    if (KindOf(fit, event) == StepKind::kBlocked)
+      reported.push_back({.covariate = "unit_id",
+                          .channel = "unit " + std::to_string(fit.model.units[event.unit].id) +
+                                     " stands elsewhere since move " +
+                                     std::to_string(fit.facts->campaign->move_id[event.row]),
+                          .size_um = SizeOf_um(fit, event),
+                          .casts_doubt = false});
+  return reported;
+}
+
+}  // namespace focalfleet::sim
