@@ -61,7 +61,6 @@ Effect MakeLoadAngleLag() {
           .continuous_shape = true,
           .distortions = kOfMoves,
           .shows = ShowsLoadAngleLag,
-          // At one drive level a lag is play.
           .traits = {.by_direction = true}};
 }
 

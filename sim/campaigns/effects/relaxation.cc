@@ -86,7 +86,6 @@ Effect MakeRelaxation() {
           .continuous_shape = true,
           .distortions = kOfMoves,
           .shows = ShowsRelaxation,
-          // At one delay a creep that is not over is play.
           .traits = {.by_direction = true}};
 }
 

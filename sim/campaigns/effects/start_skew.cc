@@ -105,7 +105,6 @@ Effect MakeStartSkew() {
           .continuous_shape = true,
           .distortions = kOfMoves,
           .shows = ShowsStartSkew,
-          // Without places in the order a late start is play.
           .traits = {.by_direction = true}};
 }
 

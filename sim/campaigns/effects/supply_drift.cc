@@ -55,7 +55,6 @@ Effect MakeSupplyDrift() {
               "the lag of all units grows with it. Log and regulate the voltage.",
           .list = ListSupplyDrift,
           .apply = ApplySupplyDrift,
-          // Over a night the air cools as the supply sinks.
           .distortions = kOfMoves,
           .traits = {.by_direction = true}};
 }

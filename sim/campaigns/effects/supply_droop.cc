@@ -143,7 +143,6 @@ Effect MakeSupplyDroop() {
           .list = ListSupplyDroop,
           .apply = ApplySupplyDroop,
           .continuous_shape = true,
-          // Without counts of the movers a sag is play.
           .distortions = kOfMoves,
           .traits = {.by_direction = true}};
 }

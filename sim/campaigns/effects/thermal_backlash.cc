@@ -56,7 +56,6 @@ Effect MakeThermalBacklash() {
               "or compensate by the measured temperature.",
           .list = ListThermalBacklash,
           .apply = ApplyThermalBacklash,
-          // Over a night the supply sinks as the air cools.
           .distortions = kOfMoves,
           .traits = {.by_direction = true}};
 }
