@@ -25,6 +25,24 @@ double DoubtBeside(const CauseFound& cause, std::span<const UnknownFound> unknow
   return unknown_um / (unknown_um + cause.size_um);
 }
 
+// The probability that a name is what the shape of a stronger cause of the axis leaves beside its
+// distortions, which are only some of the ways in which shapes differ. Such a rest has a size of
+// zero, give or take the stronger one's discrepancy.
+double DoubtBesideStronger(const CauseFound& cause, std::span<const CauseFound> causes) {
+  double doubt = 0;
+  for (const CauseFound& other : causes) {
+    const Effect* effect = FindEffect(other.cause);
+    const bool meets = other.axis == cause.axis || other.axis == "both" || cause.axis == "both";
+    if (effect == nullptr || !meets || cause.axis == "none" || other.cause == cause.cause ||
+        other.size_um <= cause.size_um)
+      continue;
+    const double sigmas = cause.size_um / (effect->discrepancy * other.size_um);
+    const double odds = std::exp(-sigmas * sigmas / 2);
+    doubt = std::max(doubt, odds / (1 + odds));
+  }
+  return doubt;
+}
+
 // A name that so many causes could have is none: what it explains is unknown. Sets of planted
 // campaigns have four names at most (half of it would make these unknown), or twenty and more.
 constexpr std::size_t kAnything = 8;
@@ -97,7 +115,8 @@ void Decide(Diagnosis* diagnosis) {
   MoveNameless(diagnosis);
   AddUntested(diagnosis->not_testable, &diagnosis->causes);
   for (CauseFound& cause : diagnosis->causes) {
-    cause.doubt = DoubtOf(cause, diagnosis->unknown);
+    cause.doubt = 1 - (1 - DoubtOf(cause, diagnosis->unknown)) *
+                          (1 - DoubtBesideStronger(cause, diagnosis->causes));
     if (cause.doubt > kDoubtMax) cause.candidates.emplace_back(kSomethingUnknown);
   }
   diagnosis->verdict = VerdictOf(*diagnosis);

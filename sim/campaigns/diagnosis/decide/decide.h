@@ -30,8 +30,9 @@ std::vector<double> PosteriorOf(const CauseFound& cause);
 void AddUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes);
 
 /// Moves what eight and more causes could be into the unknown. Gives each cause its doubt, with
-/// "unknown" as its last candidate from 10 % on, and the diagnosis its verdict. Nothing changes
-/// either afterwards.
+/// "unknown" as its last candidate from 10 % on, and the diagnosis its verdict. A name much smaller
+/// than another of its axis is in doubt, too: it may be what that one's shape leaves. Nothing
+/// changes either afterwards.
 void Decide(Diagnosis* diagnosis);
 
 }  // namespace focalfleet::sim

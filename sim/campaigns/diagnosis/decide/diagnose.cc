@@ -267,6 +267,16 @@ void RemarkOnNoise(const Fit& fit, Diagnosis* diagnosis) {
   if (diagnosis->steps_limit) Remark({RemarkOnSteps(diagnosis->steps)}, diagnosis);
 }
 
+// The fit with amplitudes as they are without distortions, which take a part of them.
+Fit WithPlainAmplitudes(const Fit& fit) {
+  Fit plain = fit;
+  LeaveOutDiscrepancies(&plain);
+  StepFit(&plain);
+  Fit named = fit;
+  named.model.terms = std::move(plain.model.terms);
+  return named;
+}
+
 // A unit's fit is no model of it where its rows show nothing of the unit, or belong to another. The
 // model then has the table's geometry for it.
 void LeaveOutImpossible(const Campaign& given, Diagnosis* diagnosis) {
@@ -357,7 +367,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   DropBeaten(options.family_wise, options.seed, &fit, &selection);
   SettleRotors(templates, rule, options.leave_out, &fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
-  NameCauses(fit, selection, options, &diagnosis);
+  NameCauses(WithPlainAmplitudes(fit), selection, options, &diagnosis);
   options.progress(0.85, "what is left");
   LookAtRest(options, &fit, &diagnosis);
   ReportClusters(fit, FindAfterFit(fit, &diagnosis.outliers), options, &diagnosis);

@@ -267,17 +267,23 @@ void DistortionColumns(const WhiteUnit& white, const Discrepancy& discrepancy,
   }
 }
 
+double CommonPrecision(const Discrepancy& discrepancy, std::size_t distortion) {
+  constexpr double kHeld = 1e18;
+  if (discrepancy.distortions[distortion] == Distortion::kOwn) return kHeld;
+  return 1 / (discrepancy.spread * discrepancy.spread);
+}
+
 void UpdateSpreads(CampaignModel* model) {
   // The prior weighs as much as four amplitudes.
   constexpr double kPrior = 4;
   for (Discrepancy& of : model->discrepancies) {
     double square = kPrior * std::pow(of.term.form.effect->discrepancy, 2), count = kPrior;
-    const auto add = [&](const std::vector<double>& values, const std::vector<double>& sigmas) {
-      for (std::size_t d = 0; d < values.size(); ++d)
-        if (sigmas[d] > 0) square += values[d] * values[d] + sigmas[d] * sigmas[d], count += 1;
+    const auto add = [&](double value, double sigma) {
+      if (sigma > 0) square += value * value + sigma * sigma, count += 1;
     };
-    add(of.common, of.common_sigma);
-    add(of.own, of.own_sigma);
+    for (std::size_t d = 0; d < of.common.size(); ++d)
+      if (of.distortions[d] != Distortion::kOwn) add(of.common[d], of.common_sigma[d]);
+    for (std::size_t d = 0; d < of.own.size(); ++d) add(of.own[d], of.own_sigma[d]);
     of.spread = std::sqrt(square / count);
   }
 }
@@ -291,7 +297,7 @@ double PriceOfDiscrepancies(const CampaignModel& model) {
   };
   for (const Discrepancy& of : model.discrepancies) {
     for (std::size_t d = 0; d < of.common.size(); ++d)
-      add(of.spread, of.common[d], of.common_sigma[d]);
+      if (of.distortions[d] != Distortion::kOwn) add(of.spread, of.common[d], of.common_sigma[d]);
     for (std::size_t d = 0; d < of.own.size(); ++d) add(of.spread, of.own[d], of.own_sigma[d]);
   }
   return price;

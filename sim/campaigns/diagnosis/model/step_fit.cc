@@ -218,8 +218,9 @@ void StepFit(Fit* fit) {
     for (const Discrepancy& of : fit->model.discrepancies)
       for (std::size_t d = 0; d < of.common.size(); ++d) {
         const Index at = shared_begin[fit->model.terms.size() + of.of] + static_cast<Index>(d);
-        all.normal(at, at) += 1 / (of.spread * of.spread);
-        all.right[at] -= of.common[d] / (of.spread * of.spread);
+        const double precision = CommonPrecision(of, d);
+        all.normal(at, at) += precision;
+        all.right[at] -= of.common[d] * precision;
       }
     const Eigen::LDLT<MatrixXd> solver(all.normal);
     shared = solver.solve(all.right);

@@ -53,9 +53,9 @@ SharedColumns ListShared(const CampaignModel& model, std::span<const std::size_t
   for (const Discrepancy& of : model.discrepancies) {
     shared.begin_of_discrepancy.push_back(shared.count);
     shared.count += static_cast<Index>(of.distortions.size());
-    for (const double value : of.common) {
-      shared.precision.push_back(1 / (of.spread * of.spread));
-      shared.value.push_back(value);
+    for (std::size_t d = 0; d < of.common.size(); ++d) {
+      shared.precision.push_back(CommonPrecision(of, d));
+      shared.value.push_back(of.common[d]);
     }
   }
   for (const std::size_t without : withouts) {

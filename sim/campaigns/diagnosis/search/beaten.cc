@@ -6,6 +6,7 @@
 
 #include "sim/campaigns/diagnosis/check/screen.h"
 #include "sim/campaigns/diagnosis/search/multi_start.h"
+#include "sim/campaigns/effects/rotor_ways.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -13,10 +14,12 @@ namespace {
 // Indices of terms, from the last to the first, so that they can be erased in this order.
 using LastFirst = std::vector<std::size_t>;
 
+// Terms of rotors are left out: their exact waves decide (rotors.h).
 LastFirst TermsOf(const CampaignModel& model, EffectAxis axis) {
   LastFirst terms;
   for (std::size_t t = model.terms.size(); t-- > 0;)
-    if (model.terms[t].form.axis == axis) terms.push_back(t);
+    if (model.terms[t].form.axis == axis && !HasRotorWays(model.terms[t].form.effect->cause))
+      terms.push_back(t);
   return terms;
 }
 

@@ -64,6 +64,19 @@ TEST(Decide, RivalsShareWhatTheDoubtLeaves) {
   EXPECT_NEAR(posterior[0] + posterior[1] + posterior[2], 1, 1e-12);
 }
 
+TEST(Decide, ANameOfTheSizeOfAnothersDiscrepancyMayBeItsMisfit) {
+  const auto candidates = [](double size_um, const char* axis) {
+    CauseFound strong = NameOf(100), weak = CauseNamed("stiction");
+    strong.axis = "phi", weak.axis = axis, weak.size_um = size_um;
+    return Found({strong, weak}, {}).causes[1].candidates.size();
+  };
+  EXPECT_EQ(candidates(8, "phi"), 2u);  // one sigma of 8 %
+  EXPECT_EQ(candidates(30, "phi"), 1u);
+  EXPECT_EQ(candidates(8, "both"), 2u);
+  EXPECT_EQ(candidates(8, "theta"), 1u);
+  EXPECT_EQ(candidates(8, "none"), 1u);
+}
+
 TEST(Decide, WhatAnythingCouldBeIsUnknown) {
   const auto decided = [](int rivals) {
     CauseFound cause = NameOf(5);
