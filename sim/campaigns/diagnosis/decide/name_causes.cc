@@ -12,6 +12,7 @@
 #include "sim/campaigns/diagnosis/terms/image_followed.h"
 #include "sim/campaigns/diagnosis/terms/outliers.h"
 #include "sim/campaigns/effects/other_causes.h"
+#include "sim/campaigns/effects/rotor_ways.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -70,6 +71,13 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   return cause;
 }
 
+// Whether the weaker cause may be the stronger one's, with rotors of the same axis. Few harmonics
+// follow a bent wave, and the next of them may pass for another cause of rotors.
+bool IsOfTheSameRotor(const CauseFound& weaker, const CauseFound& stronger) {
+  return HasRotorWays(weaker.cause) && HasRotorWays(stronger.cause) &&
+         weaker.axis == stronger.axis && std::ranges::count(weaker.candidates, stronger.cause) != 0;
+}
+
 // Merges causes of one name, of both axes or of several shapes, into one entry.
 void MergeCauses(std::vector<CauseFound>* causes) {
   // The strongest part comes first. A rival that the data do not separate from it is a rival of the
@@ -80,7 +88,7 @@ void MergeCauses(std::vector<CauseFound>* causes) {
   std::vector<CauseFound> merged;
   for (CauseFound& cause : *causes) {
     const auto same = std::find_if(merged.begin(), merged.end(), [&](const CauseFound& other) {
-      return other.cause == cause.cause;
+      return other.cause == cause.cause || IsOfTheSameRotor(cause, other);
     });
     if (same == merged.end()) {
       merged.push_back(std::move(cause));
