@@ -29,12 +29,13 @@ double DoubtBeside(const CauseFound& cause, std::span<const UnknownFound> unknow
 // distortions, which are only some of the ways in which shapes differ. Such a rest has a size of
 // zero, give or take the stronger one's discrepancy.
 double DoubtBesideStronger(const CauseFound& cause, std::span<const CauseFound> causes) {
+  if (TraitsOf(cause.cause).is_static || cause.axis == "none") return 0;
   double doubt = 0;
   for (const CauseFound& other : causes) {
     const Effect* effect = FindEffect(other.cause);
-    const bool meets = other.axis == cause.axis || other.axis == "both" || cause.axis == "both";
-    if (effect == nullptr || !meets || cause.axis == "none" || other.cause == cause.cause ||
-        other.size_um <= cause.size_um)
+    const bool meets = other.axis == cause.axis || other.axis == "both" ||
+                       (cause.axis == "both" && other.axis != "none");
+    if (effect == nullptr || !meets || other.cause == cause.cause || other.size_um <= cause.size_um)
       continue;
     const double sigmas = cause.size_um / (effect->discrepancy * other.size_um);
     const double odds = std::exp(-sigmas * sigmas / 2);
