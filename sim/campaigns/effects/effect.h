@@ -90,7 +90,7 @@ using Templates = std::vector<Template>;
 /// effect's own error, each without the part that is the error itself.
 enum class Distortion : std::uint8_t {
   kOwn,        // another amplitude in each unit
-  kBend,       // more or less than in proportion where the error is large
+  kBend,       // by another power: more or less than in proportion where the error is large
   kDrive,      // by the amplitude of the drive
   kDirection,  // by the direction of the axis' last move
   kCosine,     // by the axis' angle
@@ -98,6 +98,8 @@ enum class Distortion : std::uint8_t {
 };
 inline constexpr Distortion kOfAnyEffect[] = {Distortion::kOwn, Distortion::kBend,
                                               Distortion::kDrive};
+/// The way of an effect in proportion to a count of teeth or steps: no other shape is possible.
+inline constexpr Distortion kOfCounts[] = {Distortion::kOwn};
 /// The ways of effects that moves make: friction, play and load differ with direction and angle.
 inline constexpr Distortion kOfMoves[] = {Distortion::kOwn,    Distortion::kBend,
                                           Distortion::kDrive,  Distortion::kDirection,

@@ -35,7 +35,7 @@ Effect MakeGearScale() {
           .of_poses_alone = EachForm,
           .amplitude_low = -1,  // an axis that stands still
           .amplitude_high = 0.5,
-          .distortions = kOfMoves};
+          .distortions = kOfCounts};
 }
 
 }  // namespace focalfleet::sim

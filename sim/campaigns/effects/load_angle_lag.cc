@@ -34,7 +34,7 @@ void ApplyLoadAngleLag(const UnitTrack& track, const Template& form,
   AddRemembered(
       track, axis, form.memory,
       [&](std::size_t i) {
-        double level = std::max(drive[i], 0.05);
+        double level = std::max(drive[i], kDriveLeast);
         if (by_supply && usual_V > 0) level *= std::max(volts[i] / usual_V, 0.05);
         const double lag = form.form >= 2 ? std::asin(std::min(form.shape / level, 1.0)) /
                                                 std::asin(std::min(form.shape, 1.0))

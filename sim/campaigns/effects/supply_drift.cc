@@ -28,7 +28,7 @@ void ApplySupplyDrift(const UnitTrack& track, const Template& form,
   if (track.facts->Has("drive_amplitude")) drive = track.Column("drive_amplitude");
   const auto missing_V = [&](std::size_t i) {
     if (form.form == 0) return form.shape - volts[i];
-    const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
+    const double level = drive.empty() ? 1 : std::max(drive[i], kDriveLeast);
     // The amplitude is in volts of a light load at nominal drive.
     const double per_volt = form.shape / usual_V;
     return AddedLoadAngle(form.shape, level, 1 - volts[i] / usual_V) / per_volt;

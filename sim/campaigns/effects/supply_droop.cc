@@ -117,7 +117,7 @@ void ApplySupplyDroop(const UnitTrack& track, const Template& form,
     AddRemembered(
         track, axis, form.memory,
         [&](std::size_t i) {
-          const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
+          const double level = drive.empty() ? 1 : std::max(drive[i], kDriveLeast);
           // The load angle grows with the missing part of the drive.
           const double lag =
               way.loaded ? AddedLoadAngle(form.shape, level, way.depth * droop[i]) / way.depth

@@ -47,6 +47,10 @@ inline constexpr std::string_view kMode = "mode";  // indices of kDriveModes (ca
 inline constexpr std::string_view kArmGap = "gap to the next arm";
 inline constexpr std::string_view kArmGapSide = "side of the next arm";
 inline constexpr double kThickestArm = 0.3;  // of the pitch
+/// Least share of the nominal drive that is divided by, so that a column with zeros in it is no
+/// division by zero. Planted campaigns drive with 0.6 and more: half and double of it change
+/// nothing there.
+inline constexpr double kDriveLeast = 0.05;
 
 struct CampaignFacts {
   const Campaign* campaign = nullptr;

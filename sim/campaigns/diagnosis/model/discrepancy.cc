@@ -34,13 +34,14 @@ void ForEachUnit(const Fit& fit, const ModelTerm& term, const Look& look) {
   for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
     if (term.group_of_unit[unit] == kNoGroup || !fit.UsesUnit(unit)) continue;
     const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
-    look(unit, track, ErrorsOf(track, term, unit));
+    look(track, UndistortedOf(track, term, unit));
   }
 }
 
 Sums SumErrors(const Fit& fit, const ModelTerm& term) {
   Sums sums;
-  ForEachUnit(fit, term, [&](std::size_t, const UnitTrack& track, const PoseErrors& errors) {
+  ForEachUnit(fit, term, [&](const UnitTrack& track, const Undistorted& of) {
+    const PoseErrors& errors = of.errors;
     double of_unit = 0;
     for (std::size_t i = 0; i < track.moves; ++i) {
       if (!fit.Used(track.first_row + i)) continue;
@@ -56,59 +57,44 @@ Sums SumErrors(const Fit& fit, const ModelTerm& term) {
   return sums;
 }
 
-// Means and lengths of the factors, weighted by the squared errors in units of their channel.
-struct Moments {
-  double weight = 0;
-  std::vector<double> first, second;  // Shape: (distortions of the effect)
-};
+// The mean of each factor over all errors, weighted by their squares in units of their channel.
+std::vector<double> MeansOf(const Fit& fit, const Discrepancy& of) {
+  std::vector<double> sums(of.distortions.size(), 0);
+  double weights = 0;
+  ForEachUnit(fit, of.term, [&](const UnitTrack& track, const Undistorted& done) {
+    for (std::size_t c = 0; c < done.errors.channels().size(); ++c)
+      for (std::size_t i = 0; of.size[c] > 0 && i < track.moves; ++i) {
+        if (!fit.Used(track.first_row + i)) continue;
+        const double weight = std::pow((*done.errors.channels()[c])[i] / of.size[c], 2);
+        weights += weight;
+        for (std::size_t d = 0; weight > 0 && d < sums.size(); ++d)
+          sums[d] +=
+              weight * FactorOf(of.distortions[d], track, done, of.term.form, c, i, of.size[c]);
+      }
+  });
+  for (double& sum : sums) sum /= weights;
+  return sums;
+}
 
 Discrepancy MakeDiscrepancy(const Fit& fit, std::size_t at) {
   const ModelTerm& term = fit.model.terms[at];
-  Discrepancy made{.term = term, .of = at, .spread = term.form.effect->discrepancy};
+  const Effect& effect = *term.form.effect;
+  Discrepancy made{.term = term, .of = at, .spread = effect.discrepancy};
   if (std::ranges::all_of(term.amplitude, [](double a) { return a == 0; })) return made;
   const Sums sums = SumErrors(fit, term);
   const double noise_um = std::max(fit.noise.place_um, fit.noise.least_um);
   const double prior = std::pow(made.spread / noise_um, 2);
   if (!(prior * sums.fleet_um2 > kWorthwhile)) return made;
-  made.is_own = sums.units > 1 && prior * sums.unit_um2 > kWorthwhile;
+  const bool is_own = sums.units > 1 && prior * sums.unit_um2 > kWorthwhile;
   for (std::size_t c = 0; c < 6; ++c) made.size[c] = std::sqrt(sums.square[c] / sums.count);
-  const std::span<const Distortion> all = term.form.effect->distortions;
-  Moments moments{.first = std::vector<double>(all.size()),
-                  .second = std::vector<double>(all.size())};
-  ForEachUnit(fit, term, [&](std::size_t, const UnitTrack& track, const PoseErrors& errors) {
-    const Conditions conditions = ConditionsOf(track);
-    for (std::size_t c = 0; c < errors.channels().size(); ++c) {
-      if (!(made.size[c] > 0)) continue;
-      for (std::size_t i = 0; i < track.moves; ++i) {
-        if (!fit.Used(track.first_row + i)) continue;
-        const double relative = (*errors.channels()[c])[i] / made.size[c];
-        const double weight = relative * relative;
-        moments.weight += weight;
-        for (std::size_t d = 0; d < all.size(); ++d) {
-          const double factor =
-              FactorOf(all[d], track, conditions, AxisOfChannel(term.form, c), i, relative);
-          moments.first[d] += weight * factor;
-          moments.second[d] += weight * factor * factor;
-        }
-      }
-    }
-  });
-  if (!(moments.weight > 0)) return made;
-  constexpr double kVaries = 0.05;  // rms of a factor: a smaller one is another amplitude
-  for (std::size_t d = 0; d < all.size(); ++d) {
-    const bool is_amplitude = all[d] == Distortion::kOwn;
-    if (is_amplitude && term.sharing == Sharing::kUnit) continue;
-    const double mean = is_amplitude ? 0 : moments.first[d] / moments.weight;
-    const double length =
-        std::sqrt(std::max(moments.second[d] / moments.weight - mean * mean, 0.0));
-    if (!(length > kVaries)) continue;
-    made.distortions.push_back(all[d]);
-    made.mean.push_back(mean);
-    made.scale.push_back(1 / length);
-  }
-  made.common.assign(made.distortions.size(), 0);
+  for (const Distortion one : effect.distortions)
+    if (one != Distortion::kOwn || (is_own && term.sharing != Sharing::kUnit))
+      made.distortions.push_back(one);
+  made.mean = MeansOf(fit, made);
+  if (made.first_common() == 1) made.mean[0] = 0;
+  made.common.assign(made.distortions.size() - made.first_common(), 0);
   made.common_sigma = made.common;
-  if (made.is_own) made.own.assign(fit.model.units.size() * made.distortions.size(), 0);
+  if (is_own) made.own.assign(fit.model.units.size() * made.distortions.size(), 0);
   made.own_sigma = made.own;
   return made;
 }
@@ -172,50 +158,46 @@ void DistortionColumns(const WhiteUnit& white, const Discrepancy& discrepancy,
   const std::size_t count = discrepancy.distortions.size();
   columns->resize(static_cast<Eigen::Index>(2 * white.moves.size()),
                   static_cast<Eigen::Index>(count));
+  const Undistorted of = UndistortedOf(white.track, discrepancy.term, white.track.unit_index);
   PoseErrors errors;
-  std::vector<double> amplitude(count, 0);
   for (std::size_t d = 0; d < count; ++d) {
     errors.Reset(white.track.moves);
-    amplitude[d] = 1;
-    AddDistorted(white.track, discrepancy, white.track.unit_index, amplitude, &errors);
-    amplitude[d] = 0;
+    AddDistortion(white.track, discrepancy, of, d, 1, &errors);
     WhiteDisplacement(white, errors, columns->col(static_cast<Eigen::Index>(d)).data());
   }
 }
 
-double CommonPrecision(const Discrepancy& discrepancy, std::size_t distortion) {
-  constexpr double kHeld = 1e18;
-  if (discrepancy.distortions[distortion] == Distortion::kOwn) return kHeld;
-  return 1 / (discrepancy.spread * discrepancy.spread);
+namespace {
+
+// Calls look(amplitude, sigma) of each amplitude that has been fitted.
+template <class Look>
+void ForEachAmplitude(const Discrepancy& of, const Look& look) {
+  for (std::size_t d = 0; d < of.common.size(); ++d)
+    if (of.common_sigma[d] > 0) look(of.common[d], of.common_sigma[d]);
+  for (std::size_t d = 0; d < of.own.size(); ++d)
+    if (of.own_sigma[d] > 0) look(of.own[d], of.own_sigma[d]);
 }
+
+}  // namespace
 
 void UpdateSpreads(CampaignModel* model) {
   // The prior weighs as much as four amplitudes.
   constexpr double kPrior = 4;
   for (Discrepancy& of : model->discrepancies) {
     double square = kPrior * std::pow(of.term.form.effect->discrepancy, 2), count = kPrior;
-    const auto add = [&](double value, double sigma) {
-      if (sigma > 0) square += value * value + sigma * sigma, count += 1;
-    };
-    for (std::size_t d = 0; d < of.common.size(); ++d)
-      if (of.distortions[d] != Distortion::kOwn) add(of.common[d], of.common_sigma[d]);
-    for (std::size_t d = 0; d < of.own.size(); ++d) add(of.own[d], of.own_sigma[d]);
+    ForEachAmplitude(of, [&](double value, double sigma) {
+      square += value * value + sigma * sigma, count += 1;
+    });
     of.spread = std::sqrt(square / count);
   }
 }
 
 double PriceOfDiscrepancies(const CampaignModel& model) {
   double price = 0;
-  const auto add = [&](double spread, double value, double sigma) {
-    if (!(sigma > 0)) return;
-    price += std::log(std::max(spread * spread / (sigma * sigma), 1.0)) +
-             value * value / (spread * spread);
-  };
-  for (const Discrepancy& of : model.discrepancies) {
-    for (std::size_t d = 0; d < of.common.size(); ++d)
-      if (of.distortions[d] != Distortion::kOwn) add(of.spread, of.common[d], of.common_sigma[d]);
-    for (std::size_t d = 0; d < of.own.size(); ++d) add(of.spread, of.own[d], of.own_sigma[d]);
-  }
+  for (const Discrepancy& of : model.discrepancies)
+    ForEachAmplitude(of, [&](double value, double sigma) {
+      price += 2 * std::log(std::max(of.spread / sigma, 1.0)) + std::pow(value / of.spread, 2);
+    });
   return price;
 }
 

@@ -31,10 +31,6 @@ void LeaveOutDiscrepancies(Fit* fit);
 void DistortionColumns(const WhiteUnit& white, const Discrepancy& discrepancy,
                        Eigen::MatrixXd* columns);
 
-/// The precision of the prior of a distortion's common amplitude. A common amplitude of another
-/// size in each unit is the term itself: it is held at 0.
-double CommonPrecision(const Discrepancy& discrepancy, std::size_t distortion);
-
 /// Sets the spread of each term's distortions to what their amplitudes have, with the effect's own
 /// discrepancy as the prior (empirical Bayes, one step of EM). A shape that is right pays little.
 void UpdateSpreads(CampaignModel* model);

@@ -9,26 +9,21 @@
 
 namespace focalfleet::sim {
 
-/// The conditions of a unit's factors, in each of its moves.
-struct Conditions {
-  std::vector<double> direction[2];  // of the last move; 0: none since the homing
+/// A unit's errors by a term, and the conditions of the factors that distort them.
+struct Undistorted {
+  PoseErrors errors;
+  std::vector<double> direction[2];  // of each axis' last move; 0: none since the homing
   std::span<const double> drive;     // empty: not known
 };
+Undistorted UndistortedOf(const UnitTrack& track, const ModelTerm& term, std::size_t unit);
 
-Conditions ConditionsOf(const UnitTrack& track);
+/// The factor by which a distortion differs from the error in a channel of one move. `size`: rms
+/// error in the channel.
+double FactorOf(Distortion distortion, const UnitTrack& track, const Undistorted& of,
+                const Template& form, std::size_t channel, std::size_t move, double size);
 
-/// The axis whose moves and angle a channel's errors go with.
-std::size_t AxisOfChannel(const Template& form, std::size_t channel);
-
-/// The factor of the error in one move. `relative`: the error in units of the channel's.
-double FactorOf(Distortion distortion, const UnitTrack& track, const Conditions& conditions,
-                std::size_t axis, std::size_t move, double relative);
-
-/// The errors of the term itself in this unit.
-PoseErrors ErrorsOf(const UnitTrack& track, const ModelTerm& term, std::size_t unit);
-
-/// Adds the errors of all distortions at these amplitudes. Shape: amplitude (distortions).
-void AddDistorted(const UnitTrack& track, const Discrepancy& of, std::size_t unit,
-                  std::span<const double> amplitude, PoseErrors* errors);
+/// Adds the errors of a distortion at this amplitude.
+void AddDistortion(const UnitTrack& track, const Discrepancy& discrepancy, const Undistorted& of,
+                   std::size_t distortion, double amplitude, PoseErrors* errors);
 
 }  // namespace focalfleet::sim

@@ -44,20 +44,28 @@ struct ModelTerm {
   [[nodiscard]] std::span<const double> AmplitudeOf(std::size_t unit) const;
 };
 
-/// The distortions that the shape of a term may have, beside the term itself. Each distortion is as
-/// long as the term's error is, and has an amplitude with a prior of the effect's relative
-/// discrepancy.
+/// The distortions that the shape of a term may have, beside the term itself. Each is the term's
+/// own error times a factor about its mean over all errors. Its amplitude has a prior of the
+/// effect's relative discrepancy.
 struct Discrepancy {
-  ModelTerm term;      // as it was when the distortions were made
-  std::size_t of = 0;  // its place among the model's terms
-  std::vector<Distortion> distortions;
-  std::vector<double> mean;   // of each factor over the errors. Shape: (distortions)
-  std::vector<double> scale;  // to the error's length. Shape: (distortions)
-  double size[6] = {};        // rms error in each channel
-  double spread = 0;          // prior
-  bool is_own = false;        // whether units have amplitudes of their own beside the common ones
-  std::vector<double> common, common_sigma;  // Shape: (distortions)
-  std::vector<double> own, own_sigma;        // Shape: (units, distortions), or empty
+  ModelTerm term;                       // as it was when the distortions were made
+  std::size_t of = 0;                   // its place among the model's terms
+  std::vector<Distortion> distortions;  // kOwn first, if it is there
+  std::vector<double> mean;             // of each factor. Shape: (distortions)
+  double size[6] = {};                  // rms error in each channel
+  double spread = 0;                    // prior
+  // Units' amplitudes have a common part, but for kOwn: a common part of that is the term itself.
+  std::vector<double> common, common_sigma;  // Shape: (distortions from first_common on)
+  std::vector<double> own, own_sigma;        // Shape: (units, distortions); empty: no own part
+
+  [[nodiscard]] std::size_t first_common() const {
+    return !distortions.empty() && distortions[0] == Distortion::kOwn ? 1 : 0;
+  }
+  /// The unit's amplitudes, with the common parts. Shape: (distortions).
+  [[nodiscard]] std::vector<double> AmplitudeOf(std::size_t unit) const;
+  [[nodiscard]] bool HasUnit(std::size_t unit) const {
+    return !distortions.empty() && term.group_of_unit[unit] != kNoGroup;
+  }
 };
 
 /// Adds the errors of the unit by all distortions (discrepancy.h).

@@ -60,15 +60,17 @@ void AppendDistortions(const Fit& fit, std::size_t unit, const WhiteUnit& white,
                        const std::vector<Index>& shared_begin, UnitEquations* eq) {
   MatrixXd columns;
   for (const Discrepancy& of : fit.model.discrepancies) {
-    if (of.distortions.empty() || of.term.group_of_unit[unit] == kNoGroup) continue;
+    if (!of.HasUnit(unit)) continue;
     DistortionColumns(white, of, &columns);
-    const std::size_t begin = unit * of.distortions.size();
-    for (Index d = 0; d < columns.cols(); ++d) {
+    for (std::size_t d = 0; d < of.distortions.size(); ++d) {
+      const auto column = columns.col(static_cast<Index>(d));
       if (!of.own.empty())
-        AppendOwn(columns.col(d), 1 / (of.spread * of.spread),
-                  of.own[begin + static_cast<std::size_t>(d)], eq);
-      AppendColumn(columns.col(d), &eq->shared);
-      eq->shared_at.push_back(shared_begin[fit.model.terms.size() + of.of] + d);
+        AppendOwn(column, 1 / (of.spread * of.spread), of.own[unit * of.distortions.size() + d],
+                  eq);
+      if (d < of.first_common()) continue;
+      AppendColumn(column, &eq->shared);
+      eq->shared_at.push_back(shared_begin[fit.model.terms.size() + of.of] +
+                              static_cast<Index>(d - of.first_common()));
     }
   }
 }
@@ -175,7 +177,7 @@ void TakeOwn(const VectorXd& step, const VectorXd& sigma, const std::vector<doub
     }
   }
   for (Discrepancy& of : fit->model.discrepancies) {
-    if (of.own.empty() || of.term.group_of_unit[unit] == kNoGroup) continue;
+    if (of.own.empty() || !of.HasUnit(unit)) continue;
     for (std::size_t d = unit * of.distortions.size(); d < (unit + 1) * of.distortions.size();
          ++d, ++at)
       of.own[d] += step[at], of.own_sigma[d] = sigma[at];
@@ -195,7 +197,7 @@ void StepFit(Fit* fit) {
   }
   for (const Discrepancy& of : fit->model.discrepancies) {
     shared_begin.push_back(shared_count);
-    shared_count += static_cast<Index>(of.distortions.size());
+    shared_count += static_cast<Index>(of.common.size());
   }
   const std::vector<UnitChunk> chunks = ChunksOf(units);
   std::vector<UnitSolution> solutions(units);
@@ -218,7 +220,7 @@ void StepFit(Fit* fit) {
     for (const Discrepancy& of : fit->model.discrepancies)
       for (std::size_t d = 0; d < of.common.size(); ++d) {
         const Index at = shared_begin[fit->model.terms.size() + of.of] + static_cast<Index>(d);
-        const double precision = CommonPrecision(of, d);
+        const double precision = 1 / (of.spread * of.spread);
         all.normal(at, at) += precision;
         all.right[at] -= of.common[d] * precision;
       }

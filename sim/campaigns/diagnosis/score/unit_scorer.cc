@@ -52,10 +52,10 @@ SharedColumns ListShared(const CampaignModel& model, std::span<const std::size_t
   shared.value = shared.precision;
   for (const Discrepancy& of : model.discrepancies) {
     shared.begin_of_discrepancy.push_back(shared.count);
-    shared.count += static_cast<Index>(of.distortions.size());
-    for (std::size_t d = 0; d < of.common.size(); ++d) {
-      shared.precision.push_back(CommonPrecision(of, d));
-      shared.value.push_back(of.common[d]);
+    shared.count += static_cast<Index>(of.common.size());
+    for (const double value : of.common) {
+      shared.precision.push_back(1 / (of.spread * of.spread));
+      shared.value.push_back(value);
     }
   }
   for (const std::size_t without : withouts) {
@@ -67,8 +67,7 @@ SharedColumns ListShared(const CampaignModel& model, std::span<const std::size_t
     }
     for (std::size_t k = 0; k < model.discrepancies.size(); ++k)
       for (std::size_t d = 0;
-           model.discrepancies[k].of != without && d < model.discrepancies[k].distortions.size();
-           ++d)
+           model.discrepancies[k].of != without && d < model.discrepancies[k].common.size(); ++d)
         columns.push_back(shared.begin_of_discrepancy[k] + static_cast<Index>(d));
   }
   return shared;
@@ -76,10 +75,7 @@ SharedColumns ListShared(const CampaignModel& model, std::span<const std::size_t
 
 UnitScorer::UnitScorer(const Fit& fit, std::size_t unit, std::span<const std::size_t> withouts,
                        const SharedColumns& shared)
-    : fit_(fit),
-      unit_(unit),
-      white_(Whiten(fit, unit)),
-      begin_of_discrepancy_(shared.begin_of_discrepancy) {
+    : fit_(fit), unit_(unit), white_(Whiten(fit, unit)) {
   const std::size_t terms = fit.model.terms.size();
   shared_ = MatrixXd::Zero(white_.y.size(), shared.count);
   own_.resize(terms);
@@ -88,7 +84,7 @@ UnitScorer::UnitScorer(const Fit& fit, std::size_t unit, std::span<const std::si
   MakeHomings();
   std::vector<std::size_t> plane_of(terms + 1, kNoTerm);
   for (const std::size_t without : withouts) {
-    const bool own = without != kNoTerm && (own_[without].cols() > 0 || HasDistorted(without));
+    const bool own = without != kNoTerm && (own_[without].cols() > 0 || HasOwnDistorted(without));
     std::size_t& plane = plane_of[own ? without : terms];
     if (plane == kNoTerm) plane = planes_.size(), planes_.push_back(PlaneWithout(without));
     looks_.push_back(LookWithout(without, plane));
@@ -137,11 +133,10 @@ void UnitScorer::MakeDistorted(const SharedColumns& shared) {
   distorted_.resize(discrepancies.size());
   for (std::size_t k = 0; k < discrepancies.size(); ++k) {
     const Discrepancy& of = discrepancies[k];
-    if (of.distortions.empty() || of.term.group_of_unit[unit_] == kNoGroup) continue;
-    MatrixXd columns;
-    DistortionColumns(white_, of, &columns);
-    shared_.middleCols(shared.begin_of_discrepancy[k], columns.cols()) = columns;
-    if (!of.own.empty()) distorted_[k] = std::move(columns);
+    if (!of.HasUnit(unit_)) continue;
+    DistortionColumns(white_, of, &distorted_[k]);
+    const auto common = static_cast<Index>(of.common.size());
+    shared_.middleCols(shared.begin_of_discrepancy[k], common) = distorted_[k].rightCols(common);
   }
 }
 
@@ -168,22 +163,18 @@ UnitScorer::Plane UnitScorer::PlaneWithout(std::size_t without) const {
 }
 
 void UnitScorer::AddDistorted(std::size_t without, Plane* plane) const {
-  Index count = 0;
-  for (std::size_t k = 0; k < distorted_.size(); ++k)
-    if (k != without) count += distorted_[k].cols();
-  if (count == 0) return;
-  MatrixXd columns(white_.y.size(), count);
-  Index at = 0;
+  // Directions of fewer degrees of freedom are left out, for time.
+  constexpr double kWorthwhile = 0.02;
+  MatrixXd columns(white_.y.size(), 0);
   for (std::size_t k = 0; k < distorted_.size(); ++k) {
-    if (k == without || distorted_[k].cols() == 0) continue;
-    columns.middleCols(at, distorted_[k].cols()) =
-        distorted_[k] * fit_.model.discrepancies[k].spread;
-    at += distorted_[k].cols();
+    if (k == without || !HasOwnDistorted(k)) continue;
+    columns.conservativeResize(Eigen::NoChange, columns.cols() + distorted_[k].cols());
+    columns.rightCols(distorted_[k].cols()) = distorted_[k] * fit_.model.discrepancies[k].spread;
   }
+  if (columns.cols() == 0) return;
   plane->basis.Remove(&columns);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(columns.transpose() * columns);
-  constexpr double kWorthwhile = 0.02;  // of a whole degree of freedom
-  for (Index k = 0; k < count; ++k) {
+  for (Index k = 0; k < columns.cols(); ++k) {
     const double square = solver.eigenvalues()[k];
     if (!(square > kWorthwhile)) continue;
     const Index before = plane->basis.size();
@@ -197,17 +188,18 @@ void UnitScorer::AddDistorted(std::size_t without, Plane* plane) const {
 // Own distortions are marginalised in the plane: the data have all of them. The left-out term's
 // are gone with it, the common ones too.
 void UnitScorer::AddBackDistorted(std::size_t without, VectorXd* y) const {
-  for (std::size_t k = 0; k < fit_.model.discrepancies.size(); ++k) {
+  for (std::size_t k = 0; k < distorted_.size(); ++k) {
     const Discrepancy& of = fit_.model.discrepancies[k];
-    if (of.distortions.empty() || of.term.group_of_unit[unit_] == kNoGroup) continue;
-    const auto count = static_cast<Index>(of.distortions.size());
-    VectorXd amplitude = VectorXd::Zero(count);
-    if (!of.own.empty())
-      amplitude +=
-          Eigen::Map<const VectorXd>(of.own.data() + static_cast<Index>(unit_) * count, count);
-    if (k == without) amplitude += Eigen::Map<const VectorXd>(of.common.data(), count);
-    if (amplitude.isZero()) continue;
-    *y += shared_.middleCols(begin_of_discrepancy_[k], count) * amplitude;
+    if (!of.HasUnit(unit_)) continue;
+    if (k == without) {
+      const std::vector<double> amplitude = of.AmplitudeOf(unit_);
+      *y += distorted_[k] *
+            Eigen::Map<const VectorXd>(amplitude.data(), static_cast<Index>(amplitude.size()));
+    } else if (HasOwnDistorted(k)) {
+      *y +=
+          distorted_[k] * Eigen::Map<const VectorXd>(of.own.data() + unit_ * of.distortions.size(),
+                                                     static_cast<Index>(of.distortions.size()));
+    }
   }
 }
 

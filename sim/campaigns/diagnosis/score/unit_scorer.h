@@ -107,8 +107,9 @@ class UnitScorer {
  private:
   void MakeColumns(std::size_t t, Eigen::Index shared_begin);
   void MakeDistorted(const SharedColumns& shared);
-  [[nodiscard]] bool HasDistorted(std::size_t term) const {
-    return term < distorted_.size() && distorted_[term].cols() > 0;
+  [[nodiscard]] bool HasOwnDistorted(std::size_t term) const {
+    return term < distorted_.size() && distorted_[term].cols() > 0 &&
+           !fit_.model.discrepancies[term].own.empty();
   }
   void MakeHomings();
   [[nodiscard]] Plane PlaneWithout(std::size_t without) const;
@@ -120,8 +121,7 @@ class UnitScorer {
   std::size_t unit_;
   WhiteUnit white_;
   std::vector<Eigen::MatrixXd> own_;        // Shape: (terms): columns of units' own amplitudes
-  std::vector<Eigen::MatrixXd> distorted_;  // Shape: (terms): columns of own distortions
-  std::vector<Eigen::Index> begin_of_discrepancy_;
+  std::vector<Eigen::MatrixXd> distorted_;  // Shape: (terms): columns of distortions
   Eigen::MatrixXd shared_, homings_;
   std::vector<Plane> planes_;
   std::vector<UnitLook> looks_;

@@ -30,7 +30,6 @@ struct Rotor {
 };
 
 Rotor RotorOf(const Fit& fit, std::size_t unit, std::size_t axis) {
-  constexpr double kDriveLeast = 0.05;
   const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
   const std::span<const double> drive = track.Column("drive_amplitude");
   // The error of a rotor at rest stays until the axis moves again.
@@ -227,14 +226,13 @@ double MedianGear(const CampaignModel& model, std::size_t axis) {
   return Median(std::move(gears));
 }
 
-RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
-                         const std::vector<std::string>& left_out, Fit* fit, Selection* selection) {
+void SettleRotors(const Templates& templates, const SelectionRule& rule,
+                  const std::vector<std::string>& left_out, Fit* fit, Selection* selection) {
   constexpr double kFar_deg = 8;  // electrical: a smaller turn is a sine by either cause
-  RotorCauses reported;
-  if (!fit->facts->Has("drive_amplitude")) return reported;
+  if (!fit->facts->Has("drive_amplitude")) return;
   const std::span<const std::string_view> causes = RotorWayCauses();
   for (const std::string_view name : causes)
-    if (std::ranges::find(left_out, name) != left_out.end()) return reported;
+    if (std::ranges::find(left_out, name) != left_out.end()) return;
   for (const std::size_t axis : {std::size_t{kTheta}, std::size_t{kPhi}}) {
     std::vector<double> square_um2;
     const std::size_t at = StrongestOfAxis(*fit, axis, &square_um2);
@@ -249,14 +247,12 @@ RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
     if (fit->model.terms[at].form.effect->cause != way.cause &&
         !Exchange(templates, rule, way, at, fit, selection))
       continue;
-    reported[axis] = way.cause;
     for (std::size_t t = 0; t < fit->model.terms.size(); ++t)
       if (IsOfRotor(fit->model.terms[t], axis) &&
           fit->model.terms[t].form.effect->cause == way.cause)
         std::erase_if(selection->accepted[t].rivals,
                       [](const Rival& rival) { return HasRotorWays(rival.cause); });
   }
-  return reported;
 }
 
 }  // namespace focalfleet::sim

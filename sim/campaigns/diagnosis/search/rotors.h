@@ -13,7 +13,6 @@
 // those of the three phases.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -23,14 +22,11 @@
 
 namespace focalfleet::sim {
 
-/// For each axis the cause of its rotors' waves, where they are large enough to decide; else empty.
-using RotorCauses = std::array<std::string_view, 2>;
-
 /// Decides the cause for each axis that has a term of either. Where it is the other one, the term
 /// is exchanged for a template of that one, whose rivals are found anew. A term far from either
 /// cause is unchanged. `left_out`: causes that may not be named.
-RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
-                         const std::vector<std::string>& left_out, Fit* fit, Selection* selection);
+void SettleRotors(const Templates& templates, const SelectionRule& rule,
+                  const std::vector<std::string>& left_out, Fit* fit, Selection* selection);
 
 /// Turns of the motor per turn of the axis, the median of the units. Pre: there are units.
 double MedianGear(const CampaignModel& model, std::size_t axis);
