@@ -26,6 +26,10 @@ void ApplyFrictionWindup(const UnitTrack& track, const Template& form,
       &errors->angle_deg[axis]);
 }
 
+// Those of moves without the bend: the shape is how the lag grows with the size of the move.
+constexpr Distortion kBesideSize[] = {Distortion::kOwn, Distortion::kDrive, Distortion::kDirection,
+                                      Distortion::kCosine, Distortion::kSine};
+
 }  // namespace
 
 Effect MakeFrictionWindup() {
@@ -42,7 +46,7 @@ Effect MakeFrictionWindup() {
           .apply = ApplyFrictionWindup,
           .of_poses_alone = EachForm,
           .continuous_shape = true,
-          .distortions = kOfMoves};
+          .distortions = kBesideSize};
 }
 
 }  // namespace focalfleet::sim

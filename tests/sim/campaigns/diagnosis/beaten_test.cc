@@ -69,7 +69,8 @@ TEST(Beaten, ARippleOfOneUnitIsNoTooth) {
     const Diagnosis diagnosis = Verdicts(Rippled(3.7, 0.4, seed, {7}));
     EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << Reported(diagnosis);
     for (const CauseFound& cause : diagnosis.causes)
-      EXPECT_TRUE(IsGeometry(cause)) << Reported(diagnosis);
+      EXPECT_TRUE(IsGeometry(cause) || std::ranges::count(cause.candidates, "unknown") == 1)
+          << Reported(diagnosis);
   }
 }
 
