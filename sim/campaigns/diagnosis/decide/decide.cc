@@ -44,9 +44,9 @@ double DoubtBesideStronger(const CauseFound& cause, std::span<const CauseFound> 
   return doubt;
 }
 
-// A name that so many causes could have is none: its part of the errors is unknown. On the 121
-// campaigns of docs/diagnosis.md, Discrepancy, half of it takes nine names more, of which each set
-// has the truth, and double of it one less.
+// A name that so many causes could have is none: its part of the errors is unknown. On 121
+// campaigns of another author's generator, half of it takes nine names more, of which each set has
+// the truth, and double of it one less.
 constexpr std::size_t kAnything = 8;
 
 void MoveNameless(Diagnosis* diagnosis) {
