@@ -163,7 +163,9 @@ UnitScorer::Plane UnitScorer::PlaneWithout(std::size_t without) const {
 }
 
 void UnitScorer::AddDistorted(std::size_t without, Plane* plane) const {
-  // Directions of fewer degrees of freedom are left out, for time.
+  // The prior's squared length in units of the noise. A direction with less is left out, for time:
+  // evidence along it is then too large by that share at most. Half and double of it change no
+  // verdict (docs/diagnosis.md, Discrepancy).
   constexpr double kWorthwhile = 0.02;
   MatrixXd columns(white_.y.size(), 0);
   for (std::size_t k = 0; k < distorted_.size(); ++k) {
