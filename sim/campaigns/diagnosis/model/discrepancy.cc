@@ -10,6 +10,7 @@ namespace focalfleet::sim {
 namespace {
 
 // Distortions that explain less than this, by their prior, are left out: squared whitened length.
+// Half and double of it change no verdict (docs/diagnosis.md, Discrepancy).
 constexpr double kWorthwhile = 0.1;
 
 // An upper bound of the displacement that errors make in one move, um.
