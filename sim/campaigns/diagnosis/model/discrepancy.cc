@@ -118,8 +118,8 @@ bool AreOfTheTerms(const CampaignModel& model) {
 
 // Whether the term's amplitudes are those that its distortions were made for, nearly.
 bool IsNearlyAs(const ModelTerm& was, const ModelTerm& term) {
-  // A share of the amplitude: the prior's spread is no better known. Half changes no verdict, double one
-  // list of candidates of 43 campaigns (docs/diagnosis.md, Discrepancy).
+  // A share of the amplitude: the prior's spread is no better known. Half changes no verdict,
+  // double one list of candidates of 43 campaigns (docs/diagnosis.md, Discrepancy).
   constexpr double kChange = 0.05;
   double change = 0, square = 0;
   for (std::size_t k = 0; k < term.amplitude.size(); ++k) {
