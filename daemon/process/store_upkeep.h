@@ -9,14 +9,10 @@
 namespace focalfleet {
 
 /// A function for StoreThread::Sinks::upkeep: it logs the head of the audit and hands it to
-/// `report`, where that is another one than the last, and prunes as PruningOf does. A head that
-/// `report` does not take (false) is handed over the next time. `store` outlives it. Errors: as
-/// PruningOf.
+/// `report`, where that is another one than the last, and prunes history older than `keep_days` (0:
+/// none). A head that `report` does not take (false) is handed over the next time. `store` outlives
+/// it. Errors: as PruningOf.
 Result<std::function<bool()>> UpkeepOf(Store* store, std::uint32_t keep_days,
                                        std::function<bool(const AuditHead&)> report);
-
-/// A function that prunes a piece of the history older than `keep_days` (0: none), for
-/// StoreThread::Sinks::upkeep. `store` outlives it. Errors: as Store::Newest.
-Result<std::function<bool()>> PruningOf(Store* store, std::uint32_t keep_days);
 
 }  // namespace focalfleet

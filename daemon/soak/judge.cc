@@ -43,13 +43,10 @@ Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* trouble
              const Draws& draws)
     : plant_(plant),
       troubles_(troubles),
-      store_(disk,
-             [this](const std::string& rule, const std::string& what) { Broken(rule, what); }),
+      store_(disk, Tells()),
       seen_(plant->layout().size()),
-      stops_(plant, troubles,
-             [this](const std::string& rule, const std::string& what) { Broken(rule, what); }),
-      motion_(plant, troubles, draws.rail_motors * MotorAsMeasured_W(),
-              [this](const std::string& rule, const std::string& what) { Broken(rule, what); }) {
+      stops_(plant, troubles, Tells()),
+      motion_(plant, troubles, draws.rail_motors * MotorAsMeasured_W(), Tells()) {
   const auto units = plant->layout().units();
   near_.resize(units.size());
   for (std::size_t i = 0; i < units.size(); ++i)
@@ -58,6 +55,10 @@ Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* trouble
                                       units[i].base_fp.y_mm - units[j].base_fp.y_mm);
       if (apart < units[i].reach_mm() + units[j].reach_mm()) near_[i].push_back(j);
     }
+}
+
+StoreJudge::Broken Judge::Tells() {
+  return [this](const std::string& rule, const std::string& what) { Broken(rule, what); };
 }
 
 void Judge::Broken(const std::string& rule, const std::string& what) {

@@ -82,6 +82,8 @@ class Judge {
     std::uint32_t moves_begun = 0;
     std::uint32_t begun_twice = 0;
   };
+  /// The callback of the judges that it is made of.
+  StoreJudge::Broken Tells();
   void LookAtStarts(std::size_t row, const sim::UnitTruth& truth);
   void LookAtPlace(std::size_t row, const sim::UnitTruth& truth);
   void LookAtFibre(std::size_t row, const sim::UnitTruth& truth, const StoredPlace& place);

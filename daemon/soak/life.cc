@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/soak/virtual_time.h"
+#include "daemon/store/retention.h"
 #include "daemon/store/store_reader.h"
 #include "daemon/verbs/model_upkeep.h"
 #include "fleet/plan/job.h"
@@ -72,13 +73,14 @@ Status Life::Open() {
   around_.starts(stored, config);
   coordinator_ =
       std::make_unique<Coordinator>(&layout, around_.plant->drives(), config, std::move(stored));
-  writer_ = std::make_unique<StoreWriter>(MakeSinks());
+  FOCALFLEET_TRY_ASSIGN(StoreWriter::Sinks sinks, MakeSinks());
+  writer_ = std::make_unique<StoreWriter>(std::move(sinks));
   MakeQueues();
   MakeShell();
   return {};
 }
 
-StoreWriter::Sinks Life::MakeSinks() {
+Result<StoreWriter::Sinks> Life::MakeSinks() {
   StoreWriter::Sinks sinks;
   sinks.commit = [this](std::span<const Row> rows, WallTime at, std::size_t* refused) {
     around_.commits(rows);
@@ -96,30 +98,15 @@ StoreWriter::Sinks Life::MakeSinks() {
   sinks.log_info = around_.log;
   sinks.monotonic_ns = &ReadVirtualNs;
   sinks.wall = &ReadVirtualWall;
-  sinks.upkeep = Upkeep();
+  FOCALFLEET_TRY_ASSIGN(sinks.upkeep, PruningOf(store_.get(), {.keep_days = around_.keep_days,
+                                                               .failed = around_.log,
+                                                               .monotonic_ns = &ReadVirtualNs,
+                                                               .wall = &ReadVirtualWall}));
   sinks.progressed = [this] { progressed_ = true; };
   sinks.offered = [this] {
     if (writer_due_ == kNever) writer_due_ = clock_.Now() + around_.commit_takes();
   };
   return sinks;
-}
-
-/// As PruningOf of the daemon, on virtual time.
-std::function<bool()> Life::Upkeep() const {
-  constexpr std::uint32_t kRowsAtOnce = 2000;
-  if (around_.keep_days == 0) return [] { return false; };
-  const auto newest = store_->Newest();
-  if (!newest) around_.log("no history is pruned: " + newest.error().text);
-  return [this, newest = newest.value_or(WallTime{0}), opened_ns = ReadVirtualNs()] {
-    const WallTime before =
-        OldBefore({.now = ReadVirtualWall(),
-                   .newest = newest,
-                   .open_s = 1e-9 * static_cast<double>(ReadVirtualNs() - opened_ns),
-                   .keep_days = around_.keep_days});
-    if (before.ns <= 0) return false;
-    const auto gone = store_->Prune(before, kRowsAtOnce);
-    return gone && gone->more;
-  };
 }
 
 void Life::MakeQueues() {

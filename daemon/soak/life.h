@@ -75,8 +75,7 @@ class Life {
  private:
   explicit Life(const Surroundings& around);
   Status Open();
-  [[nodiscard]] StoreWriter::Sinks MakeSinks();
-  [[nodiscard]] std::function<bool()> Upkeep() const;
+  Result<StoreWriter::Sinks> MakeSinks();
   void MakeQueues();
   void MakeShell();
   ShellFacts Facts() const;

@@ -55,14 +55,6 @@ Status SetUp(Connection& connection) {
 
 }  // namespace
 
-WallTime OldBefore(const HistoryAge& age) {
-  constexpr std::int64_t kDayNs = 86'400'000'000'000;
-  if (age.keep_days == 0 || age.newest.ns == 0) return WallTime{0};
-  const std::int64_t now_ns =
-      std::min(age.now.ns, age.newest.ns + static_cast<std::int64_t>(1e9 * age.open_s));
-  return WallTime{now_ns - age.keep_days * kDayNs};
-}
-
 Store::Store() : pruner_(std::make_unique<Pruner>()) {}
 Store::~Store() = default;
 

@@ -39,17 +39,6 @@ struct StoreCounters {
   std::uint64_t prune_instructions = 0;  // of SQLite
 };
 
-/// Facts by which history is old.
-struct HistoryAge {
-  WallTime now;                 // by the wall clock
-  WallTime newest;              // row of the history when the store was opened; 0: there was none
-  double open_s = 0;            // since then, by a clock that does not step
-  std::uint32_t keep_days = 0;  // 0: all history stays
-};
-/// History from before is old. The wall clock alone would not do: after a step into the future all
-/// history would be old. The newest row at the start and the time since bound it.
-WallTime OldBefore(const HistoryAge& age);
-
 /// The writer of a store.
 class Store {
  public:

@@ -1,6 +1,7 @@
 // Pruning of old history: what goes, what stays, and what a piece costs.
 #include <gmock/gmock.h>
 
+#include "daemon/store/retention.h"
 #include "tests/daemon/store/store_fixture.h"
 
 namespace focalfleet {
