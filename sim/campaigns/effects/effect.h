@@ -101,9 +101,10 @@ inline constexpr Distortion kOfAnyEffect[] = {Distortion::kOwn, Distortion::kBen
 /// The way of an effect in proportion to a count of teeth or steps: no other shape is possible.
 inline constexpr Distortion kOfCounts[] = {Distortion::kOwn};
 /// The ways of effects that moves make: friction, play and load differ with direction and angle.
-inline constexpr Distortion kOfMoves[] = {Distortion::kOwn,    Distortion::kBend,
-                                          Distortion::kDrive,  Distortion::kDirection,
-                                          Distortion::kCosine, Distortion::kSine};
+/// The bend is last, for effects whose shape says already how they grow.
+inline constexpr Distortion kOfMoves[] = {Distortion::kOwn,       Distortion::kDrive,
+                                          Distortion::kDirection, Distortion::kCosine,
+                                          Distortion::kSine,      Distortion::kBend};
 
 struct Effect {
   std::string_view cause;  // id of docs/diagnosis.md

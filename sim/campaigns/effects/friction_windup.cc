@@ -1,5 +1,6 @@
 // Friction wind-up: the drive train twists until friction gives way.
 #include <cmath>
+#include <span>
 
 #include "sim/campaigns/effects/registry.h"
 
@@ -26,10 +27,6 @@ void ApplyFrictionWindup(const UnitTrack& track, const Template& form,
       &errors->angle_deg[axis]);
 }
 
-// Those of moves without the bend: the shape is how the lag grows with the size of the move.
-constexpr Distortion kBesideSize[] = {Distortion::kOwn, Distortion::kDrive, Distortion::kDirection,
-                                      Distortion::kCosine, Distortion::kSine};
-
 }  // namespace
 
 Effect MakeFrictionWindup() {
@@ -46,7 +43,8 @@ Effect MakeFrictionWindup() {
           .apply = ApplyFrictionWindup,
           .of_poses_alone = EachForm,
           .continuous_shape = true,
-          .distortions = kBesideSize};
+          // Without the bend: the shape is how the lag grows with the size of the move.
+          .distortions = std::span(kOfMoves).first<5>()};
 }
 
 }  // namespace focalfleet::sim
