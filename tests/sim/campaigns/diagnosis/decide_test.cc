@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {
@@ -10,7 +12,7 @@ namespace {
 
 using testing::ElementsAre;
 
-constexpr double kAlone = 5.5 / 193;  // of a name where nothing is unknown
+constexpr double kAlone = 13.5 / 286;  // where nothing is unknown
 
 CauseFound NameOf(double size_um) {
   CauseFound cause = CauseNamed("backlash");
@@ -62,6 +64,15 @@ TEST(Decide, RivalsShareWhatTheDoubtLeaves) {
   EXPECT_DOUBLE_EQ(posterior[0], posterior[1]);
   EXPECT_DOUBLE_EQ(posterior[2], diagnosis.causes[0].doubt);
   EXPECT_NEAR(posterior[0] + posterior[1] + posterior[2], 1, 1e-12);
+}
+
+// Evidence supposes exact shapes and noise, and is too sure by a factor.
+TEST(Decide, EvidenceBetweenRivalsCountsLessThanItSays) {
+  CauseFound cause = NameOf(2);
+  cause.candidates.push_back("stiction");
+  cause.log_odds["stiction"] = -2.3;
+  const std::vector<double> posterior = PosteriorOf(Found({cause}, {}).causes[0]);
+  EXPECT_NEAR(posterior[1] / posterior[0], std::exp(-1), 1e-12);
 }
 
 TEST(Decide, ANameOfTheSizeOfAnothersDiscrepancyMayBeItsMisfit) {
