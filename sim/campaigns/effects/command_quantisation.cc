@@ -13,7 +13,7 @@ enum class Rounding {
   kCutMove,
   kDown,
   kTowardsZero,
-  kCutMean,  // moves are cut to a step too fine to be known: half a step is lost in each, on
+  kCutMean,  // moves are cut to a step that they do not show: half a step is lost in each, on
              // average
 };
 /// A template's form is its index in the table, and model files store it.
@@ -37,7 +37,9 @@ constexpr std::array kForms = {
 std::vector<double> ShapesOf(const RoundingForm& form) {
   const Step step = form.step;
   // An amplitude of 0.5 to 1.5 reaches from each of these to the next.
-  if (form.rounding == Rounding::kCutMean) return {0.001, 0.002, 0.004, 0.008};
+  // A larger step would show: what is cut off scatters by a step / sqrt(12), in these by 0.02 deg
+  // and less, which is what a camera and an axis that comes to rest do, too.
+  if (form.rounding == Rounding::kCutMean) return {0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064};
   if (step == Step::kMotorTurns) return {1, 4, 24, 96};
   if (step == Step::kBits) return {9, 10, 11, 12, 13, 14};
   return {0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2};

@@ -84,6 +84,25 @@ TEST(QuickLook, SeesAnyStepThatIsCutTowardsZero) {
   EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Reported(diagnosis);
 }
 
+// Each move of a unit is cut to whole steps, and what is cut off adds up. Few moves show that each
+// loses half a step on average, but not the step.
+TEST(QuickLook, CutMovesMayBeCutToAnyStep) {
+  constexpr double kStep_deg = 0.0383;
+  for (const std::uint64_t seed : {4u, 5u, 6u}) {
+    Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = seed});
+    std::vector<double> behind(campaign.rows(), 0);
+    for (std::size_t row = campaign.first_row[4]; row < campaign.first_row[5]; ++row) {
+      const double step = campaign.cmd_deg[kTheta][row] - campaign.from_deg[kTheta][row];
+      behind[row] = behind[row - 1] + std::trunc(step / kStep_deg) * kStep_deg - step;
+    }
+    TurnTheta([&](std::size_t row) { return behind[row]; }, &campaign);
+    const Diagnosis diagnosis = Verdicts(campaign);
+    ASSERT_FALSE(diagnosis.causes.empty()) << "seed " << seed;
+    EXPECT_THAT(diagnosis.causes[0].candidates, testing::Contains("command_quantisation"))
+        << "seed " << seed << ": " << Reported(diagnosis);
+  }
+}
+
 TEST(QuickLook, SeesLittleInNoise) {
   std::size_t seen = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) seen += Worth(Rounded({}, seed)).size();
