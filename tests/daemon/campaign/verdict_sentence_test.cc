@@ -51,7 +51,8 @@ TEST(VerdictSentence, IsWhatAnOperatorWouldSay) {
 TEST(VerdictSentence, HasTheProbabilityOfANameThatHasARival) {
   sim::CauseFound cause = Backlash();
   cause.candidates = {"backlash", "friction_windup"};
-  cause.log_odds = {{"friction_windup", -std::log(32)}};
+  constexpr double kTemperature = 2.3;
+  cause.log_odds = {{"friction_windup", -kTemperature * std::log(32)}};
   EXPECT_THAT(TextOf(Explained({cause})).says(),
               HasSubstr("backlash of both axes (97 %) or wind-up under friction (3 %)."));
 }
