@@ -1,6 +1,5 @@
 #include "daemon/store/store.h"
 
-#include <algorithm>
 #include <cstdlib>
 #include <variant>
 
