@@ -13,7 +13,7 @@ namespace focalfleet {
 Result<std::function<bool()>> UpkeepOf(Store* store, std::uint32_t keep_days,
                                        std::function<bool(const AuditHead&)> report) {
   const auto warn = [](const std::string& text) { spdlog::warn("{}", text); };
-  FOCALFLEET_TRY_ASSIGN(auto prune, PruningOf(store, {.keep_days = keep_days, .failed = warn}));
+  FOCALFLEET_TRY_ASSIGN(auto prune, PruningOf(store, {.keep_days = keep_days}, warn));
   return [store, prune = std::move(prune), report = std::move(report), logged = AuditHead(),
           reported = AuditHead(), more = false]() mutable {
     // Pieces of pruning follow one another; the head is for the first of each round.

@@ -40,6 +40,11 @@ Status Life::Open() {
   const Layout& layout = around_.plant->layout();
   FOCALFLEET_TRY_ASSIGN(store_, Store::Open(kStorePath, OptionsOf(*around_.disk)));
   FOCALFLEET_TRY_ASSIGN(StoredFleet stored, store_->Load());
+  FOCALFLEET_TRY_ASSIGN(auto prune, PruningOf(store_.get(),
+                                              {.keep_days = around_.keep_days,
+                                               .monotonic_ns = &ReadVirtualNs,
+                                               .wall = &ReadVirtualWall},
+                                              around_.log));
   alarms_ = AlarmRegister(stored);
   models_ = std::make_unique<ModelRegistry>(&layout, &ReadVirtualWall);
   auto hall = std::make_unique<LineHall>(
@@ -73,14 +78,13 @@ Status Life::Open() {
   around_.starts(stored, config);
   coordinator_ =
       std::make_unique<Coordinator>(&layout, around_.plant->drives(), config, std::move(stored));
-  FOCALFLEET_TRY_ASSIGN(StoreWriter::Sinks sinks, MakeSinks());
-  writer_ = std::make_unique<StoreWriter>(std::move(sinks));
+  writer_ = std::make_unique<StoreWriter>(MakeSinks(std::move(prune)));
   MakeQueues();
   MakeShell();
   return {};
 }
 
-Result<StoreWriter::Sinks> Life::MakeSinks() {
+StoreWriter::Sinks Life::MakeSinks(std::function<bool()> prune) {
   StoreWriter::Sinks sinks;
   sinks.commit = [this](std::span<const Row> rows, WallTime at, std::size_t* refused) {
     around_.commits(rows);
@@ -98,10 +102,7 @@ Result<StoreWriter::Sinks> Life::MakeSinks() {
   sinks.log_info = around_.log;
   sinks.monotonic_ns = &ReadVirtualNs;
   sinks.wall = &ReadVirtualWall;
-  FOCALFLEET_TRY_ASSIGN(sinks.upkeep, PruningOf(store_.get(), {.keep_days = around_.keep_days,
-                                                               .failed = around_.log,
-                                                               .monotonic_ns = &ReadVirtualNs,
-                                                               .wall = &ReadVirtualWall}));
+  sinks.upkeep = std::move(prune);
   sinks.progressed = [this] { progressed_ = true; };
   sinks.offered = [this] {
     if (writer_due_ == kNever) writer_due_ = clock_.Now() + around_.commit_takes();

@@ -75,7 +75,7 @@ class Life {
  private:
   explicit Life(const Surroundings& around);
   Status Open();
-  Result<StoreWriter::Sinks> MakeSinks();
+  [[nodiscard]] StoreWriter::Sinks MakeSinks(std::function<bool()> prune);
   void MakeQueues();
   void MakeShell();
   ShellFacts Facts() const;

@@ -13,10 +13,11 @@ WallTime OldBefore(const HistoryAge& age) {
   return WallTime{now_ns - age.keep_days * kDayNs};
 }
 
-Result<std::function<bool()>> PruningOf(Store* store, Retention retention) {
+Result<std::function<bool()>> PruningOf(Store* store, Retention retention,
+                                        std::function<void(const std::string&)> failed) {
   FOCALFLEET_TRY_ASSIGN(const WallTime newest, store->Newest());
   const std::int64_t opened_ns = retention.monotonic_ns();
-  return [store, retention = std::move(retention), newest, opened_ns] {
+  return [store, retention = std::move(retention), failed = std::move(failed), newest, opened_ns] {
     constexpr std::uint32_t kRowsAtOnce = 2000;  // looked at; some 10 ms
     const double open_s = 1e-9 * static_cast<double>(retention.monotonic_ns() - opened_ns);
     const WallTime before = OldBefore({.now = retention.wall(),
@@ -25,7 +26,7 @@ Result<std::function<bool()>> PruningOf(Store* store, Retention retention) {
                                        .keep_days = retention.keep_days});
     if (before.ns <= 0) return false;
     const auto gone = store->Prune(before, kRowsAtOnce);
-    if (!gone) retention.failed("old history stays for now: " + gone.error().text);
+    if (!gone) failed("old history stays for now: " + gone.error().text);
     return gone && gone->more;
   };
 }

@@ -24,13 +24,14 @@ struct HistoryAge {
 WallTime OldBefore(const HistoryAge& age);
 
 struct Retention {
-  std::uint32_t keep_days = 0;                     // 0: all history stays
-  std::function<void(const std::string&)> failed;  // called with the reason why a piece stays
+  std::uint32_t keep_days = 0;  // 0: all history stays
   std::function<std::int64_t()> monotonic_ns = &ReadMonotonicNs;
   std::function<WallTime()> wall = &WallTime::Now;
 };
-/// A function for StoreThread::Sinks::upkeep that prunes a piece of the old history and says
-/// whether there is more. `store` outlives it. Errors: as Store::Newest.
-Result<std::function<bool()>> PruningOf(Store* store, Retention retention);
+/// A function for StoreThread::Sinks::upkeep that prunes a piece of the old history and returns
+/// whether there is more. Where a piece stays because the store fails, it calls `failed` with the
+/// reason. `store` outlives it. Errors: as Store::Newest.
+Result<std::function<bool()>> PruningOf(Store* store, Retention retention,
+                                        std::function<void(const std::string&)> failed);
 
 }  // namespace focalfleet

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "daemon/store/retention.h"
+#include "tests/daemon/store/faulty_disk.h"
 #include "tests/daemon/store/store_fixture.h"
 
 namespace focalfleet {
@@ -67,6 +68,61 @@ TEST_F(StoreTest, PruneTakesNoMoreRowsAtOnceThanAsked) {
   EXPECT_EQ(PruneAll(*store, kNine), 0u);
   EXPECT_EQ(store->Load()->parameters.size(), 1u);
   EXPECT_EQ(store->Load()->units.size(), 1u);
+}
+
+/// Two moves that have ended: their rows may go.
+std::vector<Row> TwoMoves() {
+  return {Intent(1, 1, 1, {0, 0}, {1, 1}), IntentEndRow{{1}, {1}, IntentEnd::kArrived},
+          Intent(1, 1, 2, {0, 0}, {1, 1}), IntentEndRow{{1}, {2}, IntentEnd::kArrived}};
+}
+
+TEST_F(StoreTest, PruningTakesWhatIsOlderThanTheDaysKept) {
+  auto store = OpenStore();
+  test::ExpectDone(store->Commit(TwoMoves(), kEight));
+  constexpr std::int64_t kDayNs = 86'400'000'000'000;
+  std::int64_t monotonic_ns = 5;
+  WallTime wall = kNine;
+  const auto prune = PruningOf(
+      store.get(),
+      {.keep_days = 1, .monotonic_ns = [&] { return monotonic_ns; }, .wall = [&] { return wall; }},
+      [](const std::string& reason) { ADD_FAILURE() << reason; });
+  ASSERT_TRUE(prune);
+  const auto rows = [&] { return OpenReader()->Moves(std::nullopt, 10)->size(); };
+  while ((*prune)()) {
+  }
+  EXPECT_EQ(rows(), 2u) << "an hour old";
+  wall.ns += 400 * kDayNs;
+  while ((*prune)()) {
+  }
+  EXPECT_EQ(rows(), 2u) << "the wall clock stepped: no time went by";
+  monotonic_ns += 2 * kDayNs;
+  while ((*prune)()) {
+  }
+  EXPECT_EQ(rows(), 0u) << "two days old";
+}
+
+TEST_F(StoreTest, PruningSaysWhyAPieceStays) {
+  test::FaultyDisk disk;
+  auto store = OpenStore(test::FaultyDisk::kVfsName);
+  test::ExpectDone(store->Commit(TwoMoves(), kEight));
+  std::vector<std::string> reasons;
+  std::int64_t monotonic_ns = 0;
+  const auto prune = PruningOf(store.get(),
+                               {.keep_days = 1,
+                                .monotonic_ns = [&] { return monotonic_ns; },
+                                .wall = [] { return WallTime{kEight.ns + 1'000'000'000'000'000}; }},
+                               [&](const std::string& reason) { reasons.push_back(reason); });
+  ASSERT_TRUE(prune);
+  monotonic_ns = 200'000'000'000'000;  // more than two days
+  disk.FailAt(1, SQLITE_IOERR, true);
+  EXPECT_FALSE((*prune)());
+  ASSERT_EQ(reasons.size(), 1u);
+  EXPECT_THAT(reasons[0], testing::StartsWith("old history stays for now: "));
+  disk.Heal();
+  while ((*prune)()) {
+  }
+  EXPECT_EQ(reasons.size(), 1u);
+  EXPECT_EQ(PruneAll(*store, kNine), 0u) << "all that is old has gone";
 }
 
 TEST_F(StoreTest, PruneKeepsWhatSaysForWhichUnitsAModelHolds) {
