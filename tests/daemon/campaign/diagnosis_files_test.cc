@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "sim/campaigns/diagnosis/decide/decide.h"
+
 namespace focalfleet {
 namespace {
 
@@ -28,9 +30,9 @@ TEST(ReportJson, SharesAProbabilityOutAmongTheCandidates) {
   EXPECT_EQ(CauseOf(WithCause(cause))["posterior"], json::object({{"backlash", 1.0}}));
   // Nothing is known of the third: it is as probable as the cause.
   cause.candidates = {"backlash", "friction_windup", "load_angle_lag", "stiction"};
-  constexpr double kTemperature = 2.3;
-  cause.log_odds = {
-      {"friction_windup", -kTemperature * std::log(4)}, {"stiction", -2000}, {"relaxation", 0}};
+  cause.log_odds = {{"friction_windup", -sim::kTemperature * std::log(4)},
+                    {"stiction", -2000},
+                    {"relaxation", 0}};
   const json posterior = CauseOf(WithCause(cause))["posterior"];
   EXPECT_EQ(posterior.size(), 4u) << posterior;
   EXPECT_NEAR(posterior["backlash"], 4.0 / 9, 1e-12);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "daemon/campaign/cause_words.h"
+#include "sim/campaigns/diagnosis/decide/decide.h"
 #include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet {
@@ -51,8 +52,7 @@ TEST(VerdictSentence, IsWhatAnOperatorWouldSay) {
 TEST(VerdictSentence, HasTheProbabilityOfANameThatHasARival) {
   sim::CauseFound cause = Backlash();
   cause.candidates = {"backlash", "friction_windup"};
-  constexpr double kTemperature = 2.3;
-  cause.log_odds = {{"friction_windup", -kTemperature * std::log(32)}};
+  cause.log_odds = {{"friction_windup", -sim::kTemperature * std::log(32)}};
   EXPECT_THAT(TextOf(Explained({cause})).says(),
               HasSubstr("backlash of both axes (97 %) or wind-up under friction (3 %)."));
 }
