@@ -1,5 +1,6 @@
 // Friction wind-up: the drive train twists until friction gives way.
 #include <cmath>
+#include <iterator>
 #include <span>
 
 #include "sim/campaigns/effects/registry.h"
@@ -27,6 +28,10 @@ void ApplyFrictionWindup(const UnitTrack& track, const Template& form,
       &errors->angle_deg[axis]);
 }
 
+// The shape is how the lag grows with the size of the move: a bend would be another such shape.
+constexpr auto kBesideSize = std::span(kOfMoves).first<std::size(kOfMoves) - 1>();
+static_assert(*std::rbegin(kOfMoves) == Distortion::kBend);
+
 }  // namespace
 
 Effect MakeFrictionWindup() {
@@ -43,8 +48,7 @@ Effect MakeFrictionWindup() {
           .apply = ApplyFrictionWindup,
           .of_poses_alone = EachForm,
           .continuous_shape = true,
-          // Without the bend: the shape is how the lag grows with the size of the move.
-          .distortions = std::span(kOfMoves).first<5>()};
+          .distortions = kBesideSize};
 }
 
 }  // namespace focalfleet::sim
