@@ -18,6 +18,37 @@ DurationNs SecondsOf(double seconds) {
   return DurationNs{static_cast<std::int64_t>(1e9 * seconds)};
 }
 
+bool IsOfUnitOrBus(FaultSite site) {
+  return (site >= FaultSite::kBusNoise && site <= FaultSite::kUnitMarkLost) ||
+         site == FaultSite::kOldAnswers;
+}
+
+/// A late move of one unit is planned without a limit.
+void DrawPower(Draws* draws) {
+  Rng rng = Rng::Stream(draws->seed, "soak power");
+  if (rng.Below(4) > 0 || draws->is(FaultSite::kOperatorRetarget)) return;
+  const double motors = 2 * std::min<double>(draws->units, 2 * draws->units_per_bus);
+  draws->rail_motors = 0.5 + std::floor(motors * rng.Uniform(0.4, 0.8));
+}
+
+void DrawClocks(Draws* draws) {
+  Rng rng = Rng::Stream(draws->seed, "soak clocks");
+  draws->kernel_stamps = rng.Below(2) == 0;
+  if (rng.Below(2) == 0) draws->clock_error_max = LogUniform(&rng, 50e-6, 0.004);
+}
+
+/// In a quarter of the seeds only the host fails, and often.
+void DrawHostAlone(Draws* draws) {
+  Rng rng = Rng::Stream(draws->seed, "soak host alone");
+  draws->host_alone = rng.Below(4) == 0;
+  if (!draws->host_alone) return;
+  for (std::size_t n = 0; n < kFaultSites; ++n) {
+    const auto site = static_cast<FaultSite>(n);
+    if (IsOfUnitOrBus(site)) draws->armed[n] = false;
+    if (site <= FaultSite::kHostFreeze) draws->armed[n] = draws->armed[n] || rng.Below(3) == 0;
+  }
+}
+
 }  // namespace
 
 Draws DrawSeed(std::uint64_t seed, const DrawLimits& limits) {
@@ -31,7 +62,6 @@ Draws DrawSeed(std::uint64_t seed, const DrawLimits& limits) {
   draws.turn = SecondsOf(LogUniform(&rng, 0.0001, 0.002));
   draws.idle = SecondsOf(LogUniform(&rng, 1, 20));
   draws.camera = rng.Below(4) == 0;
-  draws.real_spread = false;
   // A third of the seeds has few faults, so that configurations end and late states are reached.
   const double share = rng.Below(3) == 0 ? 0.08 : rng.Uniform(0.15, 0.5);
   for (std::size_t site = 0; site < kFaultSites; ++site) {
@@ -46,12 +76,12 @@ Draws DrawSeed(std::uint64_t seed, const DrawLimits& limits) {
     draws.units = *limits.units;
     if (draws.units > 200) draws.units_per_bus = 100;
   }
-  // A late move of one unit is planned without a limit.
-  Rng power = Rng::Stream(seed, "soak power");
-  if (power.Below(4) == 0 && !draws.is(FaultSite::kOperatorRetarget)) {
-    const double motors = 2 * std::min<double>(draws.units, 2 * draws.units_per_bus);
-    draws.rail_motors = 0.5 + std::floor(motors * power.Uniform(0.4, 0.8));
-  }
+  if (limits.kinds < DrawKinds::kPower) draws.armed[Index(FaultSite::kOldAnswers)] = false;
+  if (limits.kinds < DrawKinds::kAll) draws.armed[Index(FaultSite::kOperatorModel)] = false;
+  if (limits.kinds >= DrawKinds::kPower) DrawPower(&draws);
+  if (limits.kinds < DrawKinds::kAll) return draws;
+  DrawClocks(&draws);
+  if (limits.faults) DrawHostAlone(&draws);
   return draws;
 }
 
@@ -62,8 +92,11 @@ std::string Describe(const Draws& draws) {
       draws.seed, draws.units, draws.units_per_bus, 1e-9 * static_cast<double>(draws.safety.ns),
       1e-6 * static_cast<double>(draws.commit.ns), 1e-6 * static_cast<double>(draws.plan.ns),
       1e-6 * static_cast<double>(draws.turn.ns), 1e-9 * static_cast<double>(draws.idle.ns),
-      (draws.camera ? ", camera" : "") +
-          (draws.rail_motors > 0 ? fmt::format(", {} motors a rail", draws.rail_motors) : ""));
+      std::string(draws.camera ? ", camera" : "") +
+          (draws.rail_motors > 0 ? fmt::format(", {} motors a rail", draws.rail_motors) : "") +
+          (draws.kernel_stamps ? "" : ", stamps of the reading") +
+          fmt::format(", clocks off by up to {:.2f} %", 100 * draws.clock_error_max) +
+          (draws.host_alone ? ", the host alone fails" : ""));
   bool any = false;
   for (std::size_t site = 0; site < kFaultSites; ++site) {
     if (!draws.armed[site]) continue;

@@ -22,7 +22,10 @@ struct Draws {
   DurationNs turn = Microseconds(200);  // least time between two turns
   DurationNs idle = Seconds(4);         // mean time between two requests of operators
   bool camera = false;
-  bool real_spread = false;
+  bool kernel_stamps = true;       // false: frames are stamped when the host reads them
+  double clock_error_max = 50e-6;  // of each unit's clock
+  /// Units and buses have no faults, so that a host that dies or stands still excuses little.
+  bool host_alone = false;
   double rail_motors = 0;  // as many motors of a rail may turn at a time in a plan; 0: all
   std::array<bool, kFaultSites> armed{};
   /// Mean time between two faults of a site that goes by time.
@@ -33,10 +36,19 @@ struct Draws {
   [[nodiscard]] bool is(FaultSite site) const { return armed[Index(site)]; }
 };
 
+/// Kinds of draws in the order in which they came. A seed without the later ones is the night that
+/// it was before they came.
+enum class DrawKinds : std::uint8_t {
+  kFirst,
+  kPower,  // also the power of rails, and old answers
+  kAll
+};
+
 /// Fixes what a test wants fixed.
 struct DrawLimits {
   std::optional<std::uint32_t> units;
   bool faults = true;
+  DrawKinds kinds = DrawKinds::kAll;
 };
 
 Draws DrawSeed(std::uint64_t seed, const DrawLimits& limits);

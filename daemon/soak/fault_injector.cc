@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "daemon/soak/answer_faults.h"
 #include "daemon/soak/virtual_time.h"
 #include "protocol/wire/codec.h"
 
@@ -20,7 +21,9 @@ bool IsByOccasion(FaultSite site) {
          site == kPlannerFails || site == kPlannerFull || site == kReaderBehind ||
          site == kStoreReaderFails;
 }
-bool IsOfOperators(FaultSite site) { return site >= kOperatorBusy && site <= kOperatorGone; }
+bool IsOfOperators(FaultSite site) {
+  return (site >= kOperatorBusy && site <= kOperatorGone) || site == kOperatorModel;
+}
 bool IsOfCamera(FaultSite site) { return site >= kCameraDead && site <= kCameraOtherField; }
 
 /// Limits of how long a fault lasts.
@@ -29,7 +32,11 @@ constexpr double kLastsMinS = 0.3, kLastsMaxS = 15;
 }  // namespace
 
 FaultInjector::FaultInjector(const Parts& parts, HostInstant now)
-    : parts_(parts), now_(now), rng_(Rng::Stream(parts.draws->seed, "soak faults")) {
+    : parts_(parts),
+      now_(now),
+      rng_(Rng::Stream(parts.draws->seed, "soak faults")),
+      unplugged_(parts.plant->layout().size()) {
+  parts_.disk->was_full = [this] { Count(kDiskFull); };
   for (std::size_t n = 0; n < kFaultSites; ++n) {
     const auto site = static_cast<FaultSite>(n);
     const bool timed =
@@ -74,8 +81,20 @@ bool FaultInjector::Happens(FaultSite site, double more) {
   return true;
 }
 
+bool FaultInjector::Acts(FaultSite site) {
+  if (!on_[Index(site)]) return false;
+  Count(site);
+  return true;
+}
+
 void FaultInjector::Sent(BusId bus, const CanFrame& frame) {
-  if (healed_ || !is_on(kOldAnswers)) return;
+  const auto units = parts_.plant->layout().units();
+  const std::uint32_t node = frame.id >> 11 & 0xff;
+  for (std::size_t row = 0; row < unplugged_.size(); ++row)
+    if (unplugged_[row] && units[row].bus == bus &&
+        (node == units[row].node.value || node == kBroadcastNode.value))
+      Count(kUnitUnplugged);
+  if (healed_ || !on_[Index(kOldAnswers)]) return;
   const auto buses = parts_.plant->layout().buses();
   const auto index =
       static_cast<std::size_t>(std::lower_bound(buses.begin(), buses.end(), bus) - buses.begin());
@@ -113,14 +132,14 @@ void FaultInjector::Begin(FaultSite site) {
     case kHostFreeze:
     case kWallStepBack:
     case kWallStepForward:
-      Count(site);
-      parts_.host(site);
+      if (parts_.host(site)) Count(site);
       return;
     case kDiskWriteError:
     case kDiskSyncError:
     case kDiskReadError:
+    case kDiskSlow:
     case kOldAnswers:
-      return lasting();  // counted where an operation fails, or an old answer is heard
+      return lasting();
     case kDiskDropsPages:
       parts_.disk->drops_failed_syncs = true;
       on_[Index(kDiskDropsPages)] = true;
@@ -130,15 +149,10 @@ void FaultInjector::Begin(FaultSite site) {
       });
       return;
     case kDiskFull:
-      Count(site);
       parts_.disk->bytes_max = parts_.disk->bytes();
       return Until(Lasts(), [this] { parts_.disk->bytes_max = SIZE_MAX; });
-    case kDiskSlow:
-      Count(site);
-      return lasting();
     case kForeignFrame:
     case kGarbageHeard:
-      Count(site);
       return Hear(site == kGarbageHeard);
     default:
       break;
@@ -146,7 +160,6 @@ void FaultInjector::Begin(FaultSite site) {
   auto begun = BeginOnBus(site);
   if (!begun) begun = BeginOnUnit(site);
   if (!begun) return;
-  Count(site);
   parts_.tell(fmt::format("{} on {}, {:.1f} s", Name(site), begun->on,
                           1e-9 * static_cast<double>((begun->until - now_).ns)));
 }
@@ -164,6 +177,7 @@ void FaultInjector::Hear(bool garbage) {
     // A report that decodes by chance and speaks for a unit is a lie that no host can tell; such
     // frames get a node that nobody has.
     frame.id |= 0xffu << 11;
+    if (parts_.daemon_lives()) Count(kGarbageHeard);
     parts_.plant->heard(bus)->push_back({buses[bus], now_, frame});
     return;
   }
@@ -171,7 +185,7 @@ void FaultInjector::Hear(bool garbage) {
   const Unit& unit = units[rng_.Below(units.size())];
   frame =
       Encode(HostMessage(StatusRequest{}), {unit.node, static_cast<std::uint8_t>(rng_.Below(256))});
-  parts_.plant->world().Inject(unit.bus, frame, now_, 1);
+  if (parts_.plant->world().Inject(unit.bus, frame, now_, 1)) Count(kForeignFrame);
 }
 
 std::optional<FaultInjector::Begun> FaultInjector::BeginOnBus(FaultSite site) {
@@ -179,30 +193,21 @@ std::optional<FaultInjector::Begun> FaultInjector::BeginOnBus(FaultSite site) {
   const auto buses = parts_.plant->layout().buses();
   const std::size_t index = rng_.Below(buses.size());
   const BusId bus = buses[index];
-  HostInstant end = Lasts();
-  sim::BusFaults* faults = disturb.faults(bus);
   const auto touch = [&](std::size_t which, HostInstant until) {
     Troubles::Until(until + Seconds(3), &parts_.troubles->buses[which]);
   };
+  HostInstant end = Lasts();
+  if (BeginOfFrames(site, bus, end)) {
+    touch(index, end);
+    return Begun{fmt::format("bus {}", bus.value), end};
+  }
+  // The state of a link changes at once, for a daemon that is there to see it.
+  const auto count = [this, site] {
+    if (parts_.daemon_lives()) Count(site);
+  };
   switch (site) {
-    case kBusNoise:
-      faults->bit_error_rate = std::exp(rng_.Uniform(std::log(1e-6), std::log(3e-3)));
-      Until(end, [faults] { faults->bit_error_rate = 0; });
-      break;
-    case kBusDrop:
-      faults->drop = rng_.Uniform(0.01, 0.6);
-      Until(end, [faults] { faults->drop = 0; });
-      break;
-    case kBusDuplicate:
-      faults->duplicate = rng_.Uniform(0.01, 0.5);
-      Until(end, [faults] { faults->duplicate = 0; });
-      break;
-    case kBusDelay:
-      faults->late = rng_.Uniform(0.05, 0.8);
-      faults->late_by = Milliseconds(1 + static_cast<std::int64_t>(rng_.Below(400)));
-      Until(end, [faults] { faults->late = 0; });
-      break;
     case kBusDead:
+      count();
       disturb.KillBus(bus);
       Until(end, [this, bus] { parts_.plant->world().disturb().ReviveBus(bus); });
       break;
@@ -212,32 +217,74 @@ std::optional<FaultInjector::Begun> FaultInjector::BeginOnBus(FaultSite site) {
         const BusId each = buses[which];
         const HostInstant begins = now_ + Milliseconds(static_cast<std::int64_t>(rng_.Below(2000)));
         end = begins + Milliseconds(200 + static_cast<std::int64_t>(rng_.Below(8000)));
-        Until(begins, [this, each] {
-          if (!healed_) parts_.plant->world().disturb().KillBus(each);
+        Until(begins, [this, each, count] {
+          if (healed_) return;
+          count();
+          parts_.plant->world().disturb().KillBus(each);
         });
         Until(end, [this, each] { parts_.plant->world().disturb().ReviveBus(each); });
         touch(which, end);
       }
       return Begun{"all buses", end};
     case kBusStuck:
+      count();
       disturb.StickBus(bus);
       Until(end, [this, bus] { parts_.plant->world().disturb().ReleaseBus(bus); });
       break;
     case kBusHostOff:
+      count();
       disturb.ThrowHostOff(bus);
       end = now_ + Seconds(3);
       break;
     case kForeignStop:
-      parts_.plant->world().Inject(
-          bus,
-          Encode(HostMessage(Stop{}), {kBroadcastNode, static_cast<std::uint8_t>(rng_.Below(256))}),
-          now_, 1);
+      if (parts_.plant->world().Inject(
+              bus,
+              Encode(HostMessage(Stop{}),
+                     {kBroadcastNode, static_cast<std::uint8_t>(rng_.Below(256))}),
+              now_, 1))
+        Count(site);
       break;
     default:
       return std::nullopt;
   }
   touch(index, end);
   return Begun{fmt::format("bus {}", bus.value), end};
+}
+
+bool FaultInjector::BeginOfFrames(FaultSite site, BusId bus, HostInstant end) {
+  sim::BusFaults* faults = parts_.plant->world().disturb().faults(bus);
+  std::uint32_t sim::BusFaults::Acted::*acted = nullptr;
+  double sim::BusFaults::*chance = nullptr;
+  switch (site) {
+    case kBusNoise:
+      faults->bit_error_rate = std::exp(rng_.Uniform(std::log(1e-6), std::log(3e-3)));
+      acted = &sim::BusFaults::Acted::noise;
+      chance = &sim::BusFaults::bit_error_rate;
+      break;
+    case kBusDrop:
+      faults->drop = rng_.Uniform(0.01, 0.6);
+      acted = &sim::BusFaults::Acted::drop;
+      chance = &sim::BusFaults::drop;
+      break;
+    case kBusDuplicate:
+      faults->duplicate = rng_.Uniform(0.01, 0.5);
+      acted = &sim::BusFaults::Acted::duplicate;
+      chance = &sim::BusFaults::duplicate;
+      break;
+    case kBusDelay:
+      faults->late = rng_.Uniform(0.05, 0.8);
+      faults->late_by = Milliseconds(1 + static_cast<std::int64_t>(rng_.Below(400)));
+      acted = &sim::BusFaults::Acted::late;
+      chance = &sim::BusFaults::late;
+      break;
+    default:
+      return false;
+  }
+  Until(end, [this, site, faults, acted, chance] {
+    faults->*chance = 0;
+    Count(site, std::exchange(faults->acted.*acted, 0u));
+  });
+  return true;
 }
 
 std::optional<FaultInjector::Begun> FaultInjector::BeginOnUnit(FaultSite site) {
@@ -247,12 +294,7 @@ std::optional<FaultInjector::Begun> FaultInjector::BeginOnUnit(FaultSite site) {
   const UnitId unit = units[row].id;
   const HostInstant end = Lasts();
   const Begun begun{fmt::format("unit {}", unit.value), end};
-  const auto power_cut = [&](std::size_t which) {
-    const UnitId each = units[which].id;
-    disturb.PowerCut(each);
-    parts_.troubles->jumps[which].push_back(now_);
-    Until(end, [this, each] { parts_.plant->world().disturb().PowerOn(each); });
-  };
+  const auto power_cut = [&](std::size_t which) { CutPower(site, which, end); };
   const auto deaf = [&](std::size_t which) {
     Troubles::Until(end + Seconds(3), &parts_.troubles->deaf[which]);
   };
@@ -266,19 +308,25 @@ std::optional<FaultInjector::Begun> FaultInjector::BeginOnUnit(FaultSite site) {
         if (units[which].rail == units[row].rail) power_cut(which);
       return begun;
     case kUnitFault:
+      if (parts_.plant->world().Truth(row).powered) Count(site);
       disturb.RaiseFault(unit, static_cast<FaultCode>(1 + rng_.Below(5)),
                          rng_.Below(2) == 0 ? Axis::kTheta : Axis::kPhi);
       return begun;
     case kUnitUnplugged:
       disturb.Unplug(unit);
+      unplugged_[row] = true;
       deaf(row);
-      Until(end, [this, unit] { parts_.plant->world().disturb().Plug(unit); });
+      Until(end, [this, unit, row] {
+        parts_.plant->world().disturb().Plug(unit);
+        unplugged_[row] = false;
+      });
       return begun;
     case kUnitBabbles: {
       // A babbler takes its whole bus.
       CanFrame frame{};
       frame.id = static_cast<std::uint32_t>(rng_.Below(8)) << 26 | 1u << 19 |
                  static_cast<std::uint32_t>(units[row].node.value) << 11;
+      if (parts_.plant->world().Truth(row).powered) Count(site);
       disturb.Babble(unit, frame);
       const auto buses = parts_.plant->layout().buses();
       const auto bus = std::lower_bound(buses.begin(), buses.end(), units[row].bus) - buses.begin();
@@ -288,7 +336,6 @@ std::optional<FaultInjector::Begun> FaultInjector::BeginOnUnit(FaultSite site) {
     }
     case kUnitFlashLost:
     case kUnitMarkLost:
-      // FLASH shows its damage when the unit starts anew.
       power_cut(row);
       if (site == kUnitFlashLost && parts_.troubles->counts_lost[row] == Troubles::kLongAgo)
         parts_.troubles->counts_lost[row] = now_;
@@ -299,6 +346,7 @@ std::optional<FaultInjector::Begun> FaultInjector::BeginOnUnit(FaultSite site) {
       for (int part = 0; part < 8; ++part) {
         const HostInstant at = now_ + Milliseconds(300 * part);
         Until(at, [this, unit, part] {
+          CountAnswers(kUnitIntermittent, unit);
           parts_.plant->world().disturb().faults(unit)->silent = !healed_ && part % 2 == 0;
         });
       }
@@ -309,7 +357,7 @@ std::optional<FaultInjector::Begun> FaultInjector::BeginOnUnit(FaultSite site) {
   sim::UnitFaults* faults = disturb.faults(unit);
   if (site == kUnitDeaf || site == kUnitIgnores) deaf(row);
   if (site < kUnitSilent || site > kUnitSerialZero) return std::nullopt;
-  BeginWrongAnswers(site, unit);
+  LetAnswerWrongly(site, unit, &rng_, faults);
   // Hardware is exchanged while it has no power.
   const bool exchanged = site == kUnitForeign || site == kUnitSerialZero;
   const auto power_cycle = [this, unit, row, exchanged] {
@@ -319,68 +367,36 @@ std::optional<FaultInjector::Begun> FaultInjector::BeginOnUnit(FaultSite site) {
     parts_.plant->world().disturb().PowerOn(unit);
   };
   power_cycle();
-  Until(end, [faults, power_cycle] {
+  Until(end, [this, site, unit, faults, power_cycle] {
+    CountAnswers(site, unit);
     *faults = {};
     power_cycle();
   });
   return begun;
 }
 
-void FaultInjector::BeginWrongAnswers(FaultSite site, UnitId unit) {
+/// FLASH shows its damage when the unit starts anew; its mark is set in mid-move alone.
+void FaultInjector::CutPower(FaultSite site, std::size_t row, HostInstant end) {
+  const UnitId unit = parts_.plant->layout().units()[row].id;
+  const sim::UnitTruth truth = parts_.plant->world().Truth(row);
+  const bool marked = parts_.plant->world().flash(unit).moving;
+  if (truth.powered && (site != kUnitMarkLost || marked)) Count(site);
+  parts_.plant->world().disturb().PowerCut(unit);
+  parts_.troubles->jumps[row].push_back(now_);
+  Until(end, [this, unit] { parts_.plant->world().disturb().PowerOn(unit); });
+}
+
+/// Counts what of the unit's answers the fault has changed since the last count.
+void FaultInjector::CountAnswers(FaultSite site, UnitId unit) {
+  const auto kind = KindOf(site);
+  if (!kind) return;
   sim::UnitFaults* faults = parts_.plant->world().disturb().faults(unit);
-  constexpr Function kIgnored[] = {Function::kConfirm, Function::kArm,    Function::kStageBegin,
-                                   Function::kStatus,  Function::kVector, Function::kProgress,
-                                   Function::kHome,    Function::kClock};
-  constexpr Function kRefused[] = {Function::kConfirm, Function::kArm, Function::kHome,
-                                   Function::kParameterWrite};
-  switch (site) {
-    case kUnitSilent:
-      faults->silent = true;
-      break;
-    case kUnitDeaf:
-      faults->deaf = true;
-      break;
-    case kUnitLate:
-      faults->late = Milliseconds(1 + static_cast<std::int64_t>(rng_.Below(3000)));
-      break;
-    case kUnitCopies:
-      faults->copies = static_cast<std::uint8_t>(2 + rng_.Below(4));
-      break;
-    case kUnitWrongDigest:
-      faults->wrong_digest = true;
-      break;
-    case kUnitMuteDone:
-      faults->mute_done = true;
-      break;
-    case kUnitIgnores:
-      faults->ignores = kIgnored[rng_.Below(std::size(kIgnored))];
-      break;
-    case kUnitRefuses:
-      faults->refuses = {kRefused[rng_.Below(std::size(kRefused))],
-                         static_cast<Answer>(1 + rng_.Below(7))};
-      break;
-    case kUnitStaleSequence:
-      faults->stale_sequence = true;
-      break;
-    case kUnitFaultInMotion:
-      faults->in_motion = {Milliseconds(static_cast<std::int64_t>(rng_.Below(6000))),
-                           static_cast<FaultCode>(1 + rng_.Below(5)),
-                           rng_.Below(2) == 0 ? Axis::kTheta : Axis::kPhi};
-      break;
-    case kUnitForeign:
-      faults->foreign_serial = SerialNumber{900'000 + unit.value};
-      break;
-    case kUnitSerialZero:
-      faults->foreign_serial = SerialNumber{0};
-      break;
-    default:
-      break;
-  }
+  Count(site, std::exchange(faults->acted[static_cast<std::size_t>(*kind)], 0u));
 }
 
 int FaultInjector::Disk(DiskOperation operation) {
   const auto fails = [&](FaultSite site, double chance, int code) {
-    if (!is_on(site) || rng_.Uniform() >= chance) return SQLITE_OK;
+    if (!on_[Index(site)] || rng_.Uniform() >= chance) return SQLITE_OK;
     Count(site);
     Troubles::Until(now_ + Seconds(3), &parts_.troubles->store);
     return code;
@@ -393,7 +409,7 @@ int FaultInjector::Disk(DiskOperation operation) {
     case DiskOperation::kTruncate:
       return fails(kDiskWriteError, 0.1, SQLITE_IOERR_WRITE);
     case DiskOperation::kSync:
-      if (is_on(kDiskDropsPages)) return fails(kDiskDropsPages, kOften, SQLITE_IOERR_FSYNC);
+      if (on_[Index(kDiskDropsPages)]) return fails(kDiskDropsPages, kOften, SQLITE_IOERR_FSYNC);
       return fails(kDiskSyncError, kOften, SQLITE_IOERR_FSYNC);
     case DiskOperation::kOpen:
       return SQLITE_OK;

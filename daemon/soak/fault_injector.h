@@ -1,6 +1,7 @@
 // The injector lets faults of the armed sites happen: those that go by time by itself, those that
-// go by occasions when it is asked. The injector counts each site that was reached, and notes what
-// a fault touches and until when.
+// go by occasions when it is asked. A fault that is planned may meet nothing: a full disk no write,
+// a unit that lies no question. Each site is therefore counted where it acts. The injector notes
+// what a fault touches and until when.
 #pragma once
 
 #include <functional>
@@ -26,8 +27,9 @@ class FaultInjector {
     MemoryDisk* disk = nullptr;
     Troubles* troubles = nullptr;
     FaultCounts* reached = nullptr;
-    /// Done by the host itself at a fault of it.
-    std::function<void(FaultSite)> host;
+    /// Done by the host itself at a fault of it. False: it met nothing.
+    std::function<bool(FaultSite)> host;
+    std::function<bool()> daemon_lives;
     /// Gets a line for each fault that goes by time.
     std::function<void(const std::string&)> tell;
   };
@@ -47,7 +49,8 @@ class FaultInjector {
 
   /// An operation of the disk, for MemoryDisk::fails.
   int Disk(DiskOperation operation);
-  [[nodiscard]] bool is_on(FaultSite site) const { return on_[Index(site)]; }
+  /// Whether a fault that lasts is on and acts now; it is counted then.
+  bool Acts(FaultSite site);
   Rng* rng() { return &rng_; }
 
  private:
@@ -66,10 +69,13 @@ class FaultInjector {
   };
   void Begin(FaultSite site);
   std::optional<Begun> BeginOnBus(FaultSite site);
+  /// A fault that takes or spoils frames of one bus. False: the site is no such.
+  bool BeginOfFrames(FaultSite site, BusId bus, HostInstant end);
   std::optional<Begun> BeginOnUnit(FaultSite site);
-  void BeginWrongAnswers(FaultSite site, UnitId unit);
+  void CountAnswers(FaultSite site, UnitId unit);
+  void CutPower(FaultSite site, std::size_t row, HostInstant end);
   void Until(HostInstant at, std::function<void()> undo);
-  void Count(FaultSite site) { ++(*parts_.reached)[Index(site)]; }
+  void Count(FaultSite site, std::uint64_t times = 1) { (*parts_.reached)[Index(site)] += times; }
   [[nodiscard]] HostInstant Lasts();
   DurationNs Gap(FaultSite site);
   void Hear(bool garbage);
@@ -80,6 +86,7 @@ class FaultInjector {
   bool healed_ = false;
   std::array<HostInstant, kFaultSites> due_{};
   std::array<bool, kFaultSites> on_{};  // of faults that last
+  std::vector<bool> unplugged_;         // Shape: (n)
   std::priority_queue<End, std::vector<End>, std::greater<>> ends_;
   std::uint64_t ends_number_ = 0;
 };

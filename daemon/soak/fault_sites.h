@@ -95,6 +95,7 @@ enum class FaultSite : std::uint8_t {
   kCameraOtherField,
   // An answer of a unit from long before comes once more, just before that to a new question.
   kOldAnswers,
+  kOperatorModel,
   kCount
 };
 inline constexpr std::size_t kFaultSites = static_cast<std::size_t>(FaultSite::kCount);
@@ -174,7 +175,8 @@ inline constexpr std::array<const char*, kFaultSites> kFaultSiteNames{"kill_gath
                                                                       "camera_doubled",
                                                                       "camera_turned",
                                                                       "camera_other_field",
-                                                                      "old_answers"};
+                                                                      "old_answers",
+                                                                      "operator_model"};
 
 constexpr std::size_t Index(FaultSite site) { return static_cast<std::size_t>(site); }
 constexpr const char* Name(FaultSite site) { return kFaultSiteNames[Index(site)]; }

@@ -8,7 +8,6 @@
 
 #include "daemon/soak/true_arms.h"
 #include "daemon/soak/virtual_time.h"
-#include "protocol/base/limits.h"
 
 namespace focalfleet::soak {
 namespace {
@@ -34,21 +33,31 @@ constexpr DurationNs kContactAfter = Seconds(60);
 constexpr std::size_t kReportedMax = 64;
 /// A start signal of so long ago makes no unit begin any more.
 constexpr DurationNs kMoveStale = Seconds(600);
+/// The program sizes its queues for the upload of a whole bus: for each unit the begin of a move,
+/// and the usual 8 segments of both axes. A stop and a start may come to that.
+constexpr std::size_t kFramesOfUnit = 1 + 2 * 8 + 2;
+/// A disk fails for 15 s at a time, in which each unit begins and ends few moves.
+constexpr std::size_t kBatchesOfUnit = 20;
+constexpr std::size_t kBatchesAnyway = 200;
 /// A row may be so much older than its commit, where the disk fails.
 constexpr DurationNs kRowHeld = Seconds(30);
 
 }  // namespace
 
 Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles,
-             const Draws& draws)
+             const Draws& draws, Extent survives)
     : plant_(plant),
       troubles_(troubles),
-      store_(disk, Tells()),
+      store_(disk, survives, Tells()),
       seen_(plant->layout().size()),
       stops_(plant, troubles, Tells()),
-      motion_(plant, troubles, draws.rail_motors * MotorAsMeasured_W(), Tells()) {
+      motion_(plant, troubles, draws.rail_motors * MotorAsMeasured_W(), Tells()),
+      blame_(plant, troubles, Tells()),
+      host_alone_(draws.host_alone),
+      frames_most_(plant->layout().buses().size()) {
   const auto units = plant->layout().units();
   near_.resize(units.size());
+  for (std::size_t row = 0; row < units.size(); ++row) frames_most_[BusOf(row)] += kFramesOfUnit;
   for (std::size_t i = 0; i < units.size(); ++i)
     for (std::size_t j = i + 1; j < units.size(); ++j) {
       const double apart = std::hypot(units[i].base_fp.x_mm - units[j].base_fp.x_mm,
@@ -84,6 +93,7 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
   if (done) NoteBlind(rows);
   store_.Committed(rows, done);
   if (!done) return;
+  blame_.Committed(rows, HostInstant{ReadVirtualNs()});
   for (const Row& row : rows)
     if (const auto* vector = std::get_if<VectorRow>(&row)) {
       const HostInstant at{ReadVirtualNs()};
@@ -152,11 +162,12 @@ void Judge::Published(const StatusBatch& status) {
 }
 
 void Judge::Queues(std::size_t batches, std::span<const ShellFacts::Bus> buses) {
-  constexpr std::size_t kBatchesMax = 20'000;
-  if (batches > kBatchesMax) Broken("bound", fmt::format("{} batches wait", batches));
-  for (const ShellFacts::Bus& bus : buses)
-    if (bus.waiting > 2 * limits::kFramesPerBusQueued)
-      Broken("bound", fmt::format("{} frames wait on {}", bus.waiting, bus.port));
+  const std::size_t batches_most = kBatchesAnyway + kBatchesOfUnit * plant_->layout().size();
+  if (batches > batches_most) Broken("bound", fmt::format("{} batches wait", batches));
+  for (std::size_t bus = 0; bus < buses.size(); ++bus)
+    if (buses[bus].waiting > frames_most_[bus])
+      Broken("bound", fmt::format("{} frames wait on {}, at most {} may", buses[bus].waiting,
+                                  buses[bus].port, frames_most_[bus]));
 }
 
 void Judge::Look(HostInstant now) {
@@ -203,17 +214,11 @@ std::vector<std::uint32_t> Judge::TouchingUnits() const {
   return {units.begin(), units.end()};
 }
 
-std::optional<double> Judge::OffPlace(std::size_t row) const {
-  const sim::UnitTruth truth = plant_->world().Truth(row);
-  const auto unit = acknowledged().units.find(truth.id.value);
-  if (unit == acknowledged().units.end()) return std::nullopt;
+bool Judge::HasPlace(std::size_t row) const {
+  const auto unit = acknowledged().units.find(plant_->layout().units()[row].id.value);
+  if (unit == acknowledged().units.end()) return false;
   const auto place = acknowledged().places.find(unit->second.serial);
-  if (place == acknowledged().places.end() || !IsExact(place->second)) return std::nullopt;
-  double off = 0;
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    off =
-        std::max(off, std::abs(truth.vectors[axis] - static_cast<double>(place->second[axis].low)));
-  return off;
+  return place != acknowledged().places.end() && IsExact(place->second);
 }
 
 void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
@@ -306,7 +311,7 @@ void Judge::LookForContact(std::span<const sim::UnitTruth> truths) {
       }
       if (!touching_.insert({i, j}).second) continue;
       const HostInstant since = now_ - kContactAfter;
-      bool excused = risk_ || troubles_->host > since;
+      bool excused = risk_ || (!host_alone_ && troubles_->away > since);
       for (const std::size_t row : {i, j})
         excused = excused || troubles_->buses[BusOf(row)] > since || troubles_->deaf[row] > since;
       if (!excused)

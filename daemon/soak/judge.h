@@ -10,13 +10,14 @@
 //   reported   A place reported to readers is one that the store has acknowledged.
 //   contact    No two arms touch, unless a fault kept every stop from one of them.
 //   stop       Within a bound after a stop was ordered, no reachable unit moves; and after a stop
-//   of
-//              all none begins before the next command.
+//              of all none begins before the next command.
 //   twice      No move is begun twice.
-//   bound      Queues stay within their bounds.
+//   bound      No more frames wait for a bus than the upload of all its units, and few batches for
+//              the store.
 //
-// The store, stops and motion have judges of their own (store_judge.h, stop_judge.h,
-// motion_judge.h): what survives a kill; stops; starts of one move apart, followers, power.
+// The store, stops, motion and alarms have judges of their own (store_judge.h, stop_judge.h,
+// motion_judge.h, blame_judge.h): what survives a kill; stops; starts of one move apart, followers,
+// power; units that are blamed for what the host did.
 #pragma once
 
 #include <array>
@@ -31,6 +32,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/soak/blame_judge.h"
 #include "daemon/soak/draws.h"
 #include "daemon/soak/motion_judge.h"
 #include "daemon/soak/plant.h"
@@ -46,7 +48,8 @@ namespace focalfleet::soak {
 class Judge {
  public:
   /// With a camera, places are only as exact as it sees them.
-  Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles, const Draws& draws);
+  Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles, const Draws& draws,
+        Extent survives = Extent::kAll);
   Judge(const Judge&) = delete;
   Judge& operator=(const Judge&) = delete;
 
@@ -62,7 +65,7 @@ class Judge {
   /// The store judge's.
   void LifeBegins() { store_.LifeBegins(); }
   void LifeHasBegun();
-  /// The state of the queues of a life.
+  /// The state of the queues of a life, buses in the layout's order.
   void Queues(std::size_t batches, std::span<const ShellFacts::Bus> buses);
   /// An operator takes the risk of contact from here on, or does not any more.
   void RiskTaken(bool taken) { risk_ = taken; }
@@ -74,8 +77,8 @@ class Judge {
   [[nodiscard]] const StoredPicture& acknowledged() const { return store_.acknowledged(); }
   /// Units whose arms touch, ascending.
   [[nodiscard]] std::vector<std::uint32_t> TouchingUnits() const;
-  /// Distance of a unit from its stored exact place. Units: vectors; none: no such place.
-  [[nodiscard]] std::optional<double> OffPlace(std::size_t row) const;
+  /// The store has an exact place of the hardware that is bound to the unit.
+  [[nodiscard]] bool HasPlace(std::size_t row) const;
 
  private:
   struct Seen {
@@ -109,6 +112,9 @@ class Judge {
   std::vector<Seen> seen_;
   StopJudge stops_;
   MotionJudge motion_;
+  BlameJudge blame_;
+  bool host_alone_;
+  std::vector<std::size_t> frames_most_;  // that may wait. Shape: as the layout's buses
   std::vector<std::vector<std::size_t>> near_;
   std::set<std::pair<std::size_t, std::size_t>> touching_;
   bool risk_ = false;

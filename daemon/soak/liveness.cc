@@ -174,7 +174,7 @@ void Liveness::CheckEnd() {
   if (const std::size_t open = parts_.judge->IntentsOpen(); open > 0)
     parts_.judge->Broken("liveness", fmt::format("{} intents stay open", open));
   for (std::size_t row = 0; row < parts_.layout->size(); ++row)
-    if (!parts_.judge->OffPlace(row))
+    if (!parts_.judge->HasPlace(row))
       parts_.judge->Broken("liveness", fmt::format("unit {} has no exact place in the store",
                                                    parts_.layout->units()[row].id.value));
 }

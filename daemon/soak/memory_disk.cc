@@ -106,8 +106,10 @@ struct MemoryDisk::Layer {
     const auto end = static_cast<std::size_t>(offset) + static_cast<std::size_t>(size);
     const std::size_t grows =
         end > handle->file->written.size() ? end - handle->file->written.size() : 0;
-    if (grows > 0 && disk->bytes_max != SIZE_MAX && disk->bytes() + grows > disk->bytes_max)
+    if (grows > 0 && disk->bytes_max != SIZE_MAX && disk->bytes() + grows > disk->bytes_max) {
+      disk->was_full();
       return SQLITE_FULL;
+    }
     Change change{static_cast<std::size_t>(offset),
                   std::string(static_cast<const char*>(data), static_cast<std::size_t>(size))};
     Apply(change, &handle->file->written);

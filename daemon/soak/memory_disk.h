@@ -42,6 +42,8 @@ class MemoryDisk {
 
   /// The error code of SQLite with which the operation fails; SQLITE_OK: it does not.
   std::function<int(DiskOperation)> fails = [](DiskOperation) { return SQLITE_OK; };
+  /// Called where a write finds the disk full.
+  std::function<void()> was_full = [] {};
   bool drops_failed_syncs = false;   // the kernel takes pages for clean that it could not write
   std::size_t bytes_max = SIZE_MAX;  // of all files together; more is a full disk
 

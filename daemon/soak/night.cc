@@ -43,20 +43,23 @@ Night::Night(const Draws& draws, const NightOptions& options)
   troubles_.units.assign(units, Troubles::kLongAgo);
   troubles_.jumps.resize(units);
   troubles_.counts_lost.assign(units, Troubles::kLongAgo);
-  judge_ = std::make_unique<Judge>(plant_.get(), disk_.get(), &troubles_, draws_);
+  judge_ = std::make_unique<Judge>(plant_.get(), disk_.get(), &troubles_, draws_,
+                                   options.keep_days > 0 ? Extent::kState : Extent::kAll);
   faults_ = std::make_unique<FaultInjector>(
       FaultInjector::Parts{.draws = &draws_,
                            .plant = plant_.get(),
                            .disk = disk_.get(),
                            .troubles = &troubles_,
                            .reached = &reached_,
-                           .host = [this](FaultSite site) { OfHost(site); },
+                           .host = [this](FaultSite site) { return OfHost(site); },
+                           .daemon_lives = [this] { return life_ != nullptr; },
                            .tell = [this](const std::string& what) { Tell(what); }},
       now_);
   operators_ = std::make_unique<Operators>(Operators::Parts{
       .draws = &draws_,
       .plant = plant_.get(),
       .judge = judge_.get(),
+      .troubles = &troubles_,
       .reached = &reached_,
       .put =
           [this](std::uint64_t client, const std::string& line) {
@@ -85,7 +88,7 @@ Surroundings Night::Around() {
   around.port = {.sends = [this](BusId bus, const CanFrame& frame) { Sends(bus, frame); },
                  .is_full = [this] { return faults_->Happens(kPortFull, 30); }};
   around.commit_takes = [this] {
-    const double factor = faults_->is_on(kDiskSlow) ? 50 : 1;
+    const double factor = faults_->Acts(kDiskSlow) ? 50 : 1;
     const auto mean_ns = static_cast<double>(draws_.commit.ns) * factor;
     return DurationNs{1 + static_cast<std::int64_t>(mean_ns * faults_->rng()->Uniform(0.5, 1.5))};
   };
@@ -163,34 +166,37 @@ bool Night::Hear(ClientId client, std::string_view line, bool last) {
   return operators_->Hear(client, line, last);
 }
 
-void Night::OfHost(FaultSite site) {
+bool Night::OfHost(FaultSite site) {
   Rng& rng = *faults_->rng();
+  const bool lived = life_ != nullptr;
   switch (site) {
     case kHostPowerCut:
       death_.power_cut = true;
-      return Die(site);
+      Die(site);
+      return true;
     case kHostEnds:
-      if (life_ == nullptr) return;
+      if (!lived) return false;
       Tell("the host is ended");
       try {
         static_cast<void>(life_->End());
         if (death_.dying) throw Killed{*death_.dying};
+        Die(site);
       } catch (const Killed& killed) {
-        return Die(killed.site);
+        Die(killed.site);
       }
-      return Die(site);
+      return true;
     case kHostFreeze:
       frozen_until_ = now_ + Seconds(0.05 * std::exp(rng.Uniform() * 6));
       Troubles::Until(frozen_until_ + Seconds(3), &troubles_.host);
-      return;
+      return lived;
     case kWallStepBack:
       t_virtual_time.wall_less_host_ns -= Seconds(rng.Uniform(1, 40'000)).ns;
-      return;
+      return lived;
     case kWallStepForward:
       t_virtual_time.wall_less_host_ns += Seconds(rng.Uniform(1, 40'000)).ns;
-      return;
+      return lived;
     default:
-      return;
+      return false;
   }
 }
 
@@ -244,6 +250,7 @@ void Night::TurnOfLife() {
 
 void Night::Look() {
   judge_->Look(now_);
+  operators_->LookForUnanswered(now_);
   look_at_ = now_ + kLookEvery;
   if (!options_.tell || life_ == nullptr) return;
   const Coordinator& coordinator = life_->coordinator();
@@ -272,12 +279,13 @@ void Night::RunUntil(HostInstant end, const std::function<bool()>& done) {
     plant_->Advance(now_);
     if (faults_->next() <= now_) faults_->Apply(now_);
     if (life_ == nullptr && now_ >= start_at_) StartLife();
-    if (life_ == nullptr) {
+    const bool frozen = frozen_until_ > now_;
+    if (life_ != nullptr && !done) operators_->Act(now_);
+    if (life_ == nullptr)
       plant_->DropHeard();
-    } else if (frozen_until_ <= now_) {
-      if (!done) operators_->Act(now_);
-      if (life_->wake_at() <= now_) TurnOfLife();
-    }
+    else if (!frozen && life_->wake_at() <= now_)
+      TurnOfLife();
+    if (life_ == nullptr || frozen) troubles_.away = now_;
     if (now_ >= look_at_) Look();
     if (done && done()) return;
   }
@@ -302,6 +310,7 @@ void Night::Converge() {
   t_virtual_time.wall_less_host_ns =
       std::max(t_virtual_time.wall_less_host_ns, std::int64_t{1'700'000'000'000'000'000});
   SecondPhase().Converge();
+  if (judge_->broken().empty()) operators_->LookAtEnd(now_);
 }
 
 NightResult Night::Run() {

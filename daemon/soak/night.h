@@ -65,7 +65,8 @@ class Night {
   void TurnOfLife();
   void StartLife();
   void Die(FaultSite site);
-  void OfHost(FaultSite site);
+  /// A fault of the host. False: it met nothing.
+  bool OfHost(FaultSite site);
   int OfDisk(DiskOperation operation);
   void Passed(TurnPoint point);
   void Committed(std::span<const Row> rows, bool done);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -15,6 +16,35 @@ namespace {
 using enum FaultSite;
 
 constexpr std::size_t kAnswersKept = 64;
+constexpr DurationNs kAnsweredWithin = Seconds(30);
+constexpr DurationNs kMovedWithin = Seconds(900);
+/// Units that are homed unproven go one after the other.
+constexpr DurationNs kHomedWithin = Seconds(60);
+
+/// Pre: the host is not held up and the store writes.
+DurationNs AnswerTakes(const std::string& verb, std::size_t units) {
+  if (verb == "home")
+    return kMovedWithin + DurationNs{static_cast<std::int64_t>(units) * kHomedWithin.ns};
+  const bool plans =
+      verb == "apply" || verb == "preview" || verb == "retarget" || verb == "measure";
+  return plans ? kMovedWithin : kAnsweredWithin;
+}
+
+/// A model that explains nothing and changes nothing: all units are as described.
+std::string ModelOf(const Layout& layout, std::uint64_t name) {
+  std::string text = fmt::format(
+      "name = \"model {}\"\ncampaign = \"night\"\nverdict = \"explained\"\nrms_before_um = "
+      "54\nrms_after_um = 9\n",
+      name);
+  for (const Unit& unit : layout.units())
+    text += fmt::format(
+        "[[unit]]\nunit_id = {}\nbase_x_mm = {:.9f}\nbase_y_mm = {:.9f}\narm_theta_mm = "
+        "{:.9f}\narm_phi_mm = {:.9f}\ntheta_zero_deg = {:.9f}\nphi_zero_deg = {:.9f}\n"
+        "left_theta_deg = 0.0\nleft_phi_deg = 0.0\nadded_theta_deg = 0.0\nadded_phi_deg = 0.0\n",
+        unit.id.value, unit.base_fp.x_mm, unit.base_fp.y_mm, unit.axis[0].arm_mm,
+        unit.axis[1].arm_mm, unit.axis[0].zero_deg, unit.axis[1].zero_deg);
+  return text;
+}
 
 }  // namespace
 
@@ -108,10 +138,12 @@ void Operators::ActAtRandom() {
                        {"value", 108 + rng_.Below(3)}});
   } else if (Wants(kOperatorPreview, 0.2)) {
     Ask("preview", {{"targets_csv", DrawTargets(1)}});
+  } else if (Wants(kOperatorModel, 0.3)) {
+    ChangeModel();
   } else if (Wants(kOperatorGarbage, 0.3)) {
     std::string line(rng_.Below(200), ' ');
     for (char& c : line) c = static_cast<char>(1 + rng_.Below(255));
-    open_[++client_] = {.verb = "garbage"};
+    open_[++client_] = {.verb = "garbage", .asked = now_};
     parts_.put(client_, line);
   } else if (Wants(kOperatorFlood, 0.1)) {
     for (const char* verb : {"status", "state", "alarms", "history", "events", "params", "model",
@@ -129,6 +161,38 @@ void Operators::ActAtRandom() {
     const std::uint64_t client = Ask("apply", std::move(args));
     if (Wants(kOperatorGone, 0.3)) open_[client].gone = true;
   }
+}
+
+void Operators::ChangeModel() {
+  const std::uint64_t what = rng_.Below(4);
+  if (what == 0) {
+    Ask("model_unload", Json::object());
+  } else if (what == 1) {
+    Ask("model_rollback", Json::object());
+  } else {
+    Ask("model_load",
+        {{"model_toml", ModelOf(parts_.plant->layout(), rng_.Below(3))}, {"source", "soak.toml"}});
+  }
+}
+
+void Operators::LookForUnanswered(HostInstant now) {
+  const HostInstant well_since = std::max(parts_.troubles->away, parts_.troubles->store);
+  for (const auto& [client, open] : open_) {
+    const DurationNs within = AnswerTakes(open.verb, parts_.plant->layout().size());
+    if (open.gone || now < std::max(open.asked, well_since) + within) continue;
+    parts_.judge->Broken(
+        "answer", fmt::format("request {} ({}) has no answer since {:.1f} s", client, open.verb,
+                              1e-9 * static_cast<double>((now - open.asked).ns)));
+    return;
+  }
+}
+
+void Operators::LookAtEnd(HostInstant now) {
+  constexpr DurationNs kPause = Seconds(2);
+  for (const auto& [client, open] : open_)
+    if (!open.gone && now - open.asked > kPause)
+      return parts_.judge->Broken(
+          "answer", fmt::format("request {} ({}) was never answered", client, open.verb));
 }
 
 bool Operators::Hear(std::uint64_t client, std::string_view line, bool last) {

@@ -1,5 +1,8 @@
 // The operators of a simulated night: they send requests at random, or those that set a fleet right
-// again, and note the answers. Each request has a client of its own.
+// again, and note the answers. Each request has a client of its own. They know of no pause of the
+// host, and go on sending. Each request is answered while the daemon lives. The longest waits are
+// those for a configuration, some 100 s a round, and for plans behind slow ones of up to 60 s each.
+// All others wait for the store at most.
 #pragma once
 
 #include <cstdint>
@@ -25,6 +28,7 @@ class Operators {
     const Draws* draws = nullptr;
     const Plant* plant = nullptr;
     Judge* judge = nullptr;
+    const Troubles* troubles = nullptr;
     FaultCounts* reached = nullptr;
     /// Puts a line into the daemon that lives; nothing where none does.
     std::function<void(std::uint64_t client, const std::string& line)> put;
@@ -45,6 +49,10 @@ class Operators {
 
   /// A line of the daemon. False: the client is gone.
   bool Hear(std::uint64_t client, std::string_view line, bool last);
+  /// Looks for requests that should have been answered by now.
+  void LookForUnanswered(HostInstant now);
+  /// Everything is over: no request may be open that is older than a person's pause.
+  void LookAtEnd(HostInstant now);
   /// Clients of a daemon that died hear no more.
   void DaemonDied() { open_.clear(); }
 
@@ -60,6 +68,7 @@ class Operators {
   };
   bool Wants(FaultSite site, double chance);
   Json OneUnit(UnitId* unit);
+  void ChangeModel();
   void ActAtRandom();
   void CheckAnswer(const Open& open, const ControlAnswer& answer);
 

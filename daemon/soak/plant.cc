@@ -31,7 +31,9 @@ Plant::Plant(const Draws& draws) {
   drives_.assign(layout_->size(), UnitDrive{});
   const auto first = DrawConfiguration(*layout_, drives_, {}, Rng::Stream(draws.seed, "start"));
   FOCALFLEET_CHECK(first.has_value());
-  sim::WorldConfig config{.units = DescribeUnits(*layout_), .seed = draws.seed};
+  sim::WorldConfig config{.units = DescribeUnits(*layout_),
+                          .seed = draws.seed,
+                          .clock_error_max = draws.clock_error_max};
   for (std::uint32_t n = 0; n < layout_->size(); ++n)
     for (const Axis axis : kAxes)
       config.units[n].axis[Index(axis)].angle_deg =
@@ -40,6 +42,7 @@ Plant::Plant(const Draws& draws) {
   config.start = HostInstant{ReadVirtualNs()};
   FOCALFLEET_CHECK(sim::World::Validate(config).has_value());
   world_ = std::make_unique<sim::World>(std::move(config));
+  kernel_stamps_ = draws.kernel_stamps;
   remembers_ = draws.is(FaultSite::kOldAnswers);
   heard_.resize(layout_->buses().size());
 }
@@ -112,9 +115,9 @@ std::size_t PlantPort::Send(std::span<const CanFrame> frames) {
 
 void PlantPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   auto& mine = *plant_->heard(index_);
-  // Frames are stamped when they are heard where the host was held up, as on a socket without
-  // stamps of the kernel.
-  for (ReceivedFrame& frame : mine) frame.at = std::min(frame.at, now);
+  // The host may have been held up since a frame came.
+  if (!plant_->kernel_stamps())
+    for (ReceivedFrame& frame : mine) frame.at = now;
   out->insert(out->end(), mine.begin(), mine.end());
   mine.clear();
   link_->state.Look(plant_->world());

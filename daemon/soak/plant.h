@@ -35,6 +35,8 @@ class Plant {
   [[nodiscard]] const sim::World& world() const { return *world_; }
   [[nodiscard]] std::vector<ReceivedFrame>* heard(std::size_t bus) { return &heard_[bus]; }
   [[nodiscard]] bool hears() const;
+  /// False: a host stamps frames when it reads them, as where its kernel has no stamps.
+  [[nodiscard]] bool kernel_stamps() const { return kernel_stamps_; }
   /// The newest answer of this unit to a question of the same kind, under another
   /// sequence number. None: there is none among its last ones.
   [[nodiscard]] std::optional<CanFrame> AnsweredBefore(std::size_t bus,
@@ -49,6 +51,7 @@ class Plant {
   std::unique_ptr<sim::World> world_;
   std::vector<std::vector<ReceivedFrame>> heard_;  // Shape: as the layout's buses
   std::vector<ReceivedFrame> delivered_;
+  bool kernel_stamps_ = true;
   bool remembers_ = false;
   std::map<std::pair<std::size_t, std::uint32_t>, std::deque<CanFrame>> answers_;  // by bus, node
 };

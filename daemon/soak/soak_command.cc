@@ -43,8 +43,7 @@ int Report(const Summary& summary, const std::vector<std::uint64_t>& missing) {
   std::string text = summary.Table();
   if (!missing.empty()) text += fmt::format("never ran: {}\n", RangesOf(missing));
   cli::PrintText(text);
-  const bool good = summary.failed().empty() && summary.NeverReached().empty() && missing.empty();
-  return static_cast<int>(good ? ExitCode::kOk : ExitCode::kRefused);
+  return static_cast<int>(summary.Good() && missing.empty() ? ExitCode::kOk : ExitCode::kRefused);
 }
 
 int RunWeek(std::uint64_t seed, const SoakOptions& options) {
@@ -108,7 +107,7 @@ int RunSoak(const SoakOptions& options) {
   const auto seeds = ParseSeeds(options.seeds);
   if (!seeds) return ComplainOf(seeds.error(), ExitCode::kUsage);
   if (!options.merge_folder.empty()) {
-    const auto merged = MergeFolder(options.merge_folder);
+    const auto merged = MergeFolder(options.merge_folder, *seeds);
     if (!merged) return ComplainOf(merged.error(), ExitCode::kRefused);
     return Report(*merged, NeverRan(*merged, *seeds));
   }

@@ -22,8 +22,7 @@ bool Moves(const sim::UnitTruth& truth) {
 bool StopJudge::IsReached(std::size_t row, HostInstant since) const {
   const auto buses = plant_->layout().buses();
   const auto bus = std::lower_bound(buses.begin(), buses.end(), plant_->layout().units()[row].bus);
-  return since > troubles_->host &&
-         since > troubles_->buses[static_cast<std::size_t>(bus - buses.begin())] &&
+  return since > troubles_->buses[static_cast<std::size_t>(bus - buses.begin())] &&
          since > troubles_->deaf[row];
 }
 
@@ -45,7 +44,7 @@ void StopJudge::MotionCommanded(HostInstant now) {
 void StopJudge::Look(HostInstant now, std::size_t row, const sim::UnitTruth& truth) {
   if (now < must_rest_[row]) return;
   const HostInstant ordered = std::exchange(must_rest_[row], kNever) - kStopWithin;
-  if (IsReached(row, ordered) && Moves(truth) && truth.began < ordered)
+  if (troubles_->away < ordered && IsReached(row, ordered) && Moves(truth) && truth.began < ordered)
     broken_("stop", fmt::format("unit {} still moves {} ms after a stop", truth.id.value,
                                 kStopWithin.ns / 1'000'000));
 }

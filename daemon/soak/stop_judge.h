@@ -2,6 +2,9 @@
 //
 //   stop       Within a bound after a stop was ordered, no unit that it can reach moves. After a
 //              stop of all was answered, no unit begins to move before the next command.
+//
+// A host that was dead or held up between the order and its bound excuses the first half of the
+// rule, and nothing excuses the second one on the host's side: it has answered.
 #pragma once
 
 #include <cstddef>
@@ -38,7 +41,7 @@ class StopJudge {
   void LookAtStart(std::size_t row, const sim::UnitTruth& truth);
 
  private:
-  /// No fault has kept a frame from the unit since then.
+  /// No fault of bus or unit has kept a frame from the unit since then.
   [[nodiscard]] bool IsReached(std::size_t row, HostInstant since) const;
 
   const Plant* plant_;

@@ -1,8 +1,8 @@
 // The store judge remembers what the store has acknowledged, and compares it with what each new
 // process reads from the disk. The rule is:
 //
-//   durable    What was acknowledged as committed is there after every kill and power cut, and
-//              nothing that was not offered is there.
+//   durable    What was acknowledged as committed is there after every kill and power cut, in every
+//              table that a start reads, and nothing that was not offered is there.
 //
 // A commit that failed may be there or not. A process that reads it writes the log once more before
 // it begins, so from then on it counts as acknowledged.
@@ -15,6 +15,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "daemon/soak/memory_disk.h"
 #include "daemon/soak/stored_picture.h"
@@ -22,13 +23,12 @@
 
 namespace focalfleet::soak {
 
-/// The place of a row as the disk has it.
-StoredPlace PlaceOf(const VectorRow& vector);
-
 class StoreJudge {
  public:
   using Broken = std::function<void(const std::string& rule, const std::string& what)>;
-  StoreJudge(const MemoryDisk* disk, Broken broken) : disk_(disk), broken_(std::move(broken)) {}
+  /// `extent`: what survives kills. With kAll the judge remembers all rows of a night.
+  StoreJudge(const MemoryDisk* disk, Extent extent, Broken broken)
+      : disk_(disk), extent_(extent), broken_(std::move(broken)) {}
 
   void Commits(std::span<const Row> rows);
   void Committed(std::span<const Row> rows, bool done);
@@ -46,17 +46,17 @@ class StoreJudge {
   [[nodiscard]] std::size_t IntentsOpen() const;
 
  private:
-  static void Apply(std::span<const Row> rows, StoredPicture* picture);
   void Compare(const StoredPicture& read) const;
 
   const MemoryDisk* disk_;
+  Extent extent_;
   Broken broken_;
   PictureReader reader_;
   std::optional<StoredPicture> durable_;
   std::uint64_t durable_syncs_ = UINT64_MAX;
   StoredPicture acknowledged_;
-  std::optional<StoredPicture> in_flight_;  // with the batch that is being committed
-  std::optional<StoredPicture> read_;       // by the process that starts
+  std::vector<Row> in_flight_;         // the batch that is being committed
+  std::optional<StoredPicture> read_;  // by the process that starts
 };
 
 }  // namespace focalfleet::soak

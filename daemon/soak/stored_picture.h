@@ -1,15 +1,20 @@
-// The fleet as a disk describes it, read by SQL of its own. The judge takes nothing from the
-// daemon's store: a mistake there must not hide itself here.
+// The fleet as a disk describes it, read by SQL of its own, and the same as the rows that were
+// committed describe it. The judge takes nothing from the daemon's store but the types of its rows:
+// a mistake there must not hide itself here. Places, bindings and open intents have types, because
+// other rules use them; the rows of all other tables are texts, of which only sameness counts. The
+// histories of units, axes, parameters and tunings, and the times of rows, are not compared.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "daemon/soak/memory_disk.h"
+#include "fleet/records.h"
 
 namespace focalfleet::soak {
 
@@ -41,17 +46,36 @@ struct StoredPicture {
   struct Unit {
     std::uint32_t serial = 0;
     bool enabled = true;
+    std::string reason;
     bool operator==(const Unit&) const = default;
   };
   std::map<std::uint32_t, Unit> units;
+  using Table = std::map<std::string, std::string>;  // values by key, cells parted by |
+  std::map<std::string, Table> others;
   bool operator==(const StoredPicture&) const = default;
 };
+
+/// How much of a store a picture has.
+enum class Extent : std::uint8_t {
+  kMotion,  // places, open intents and bindings
+  kState,   // also the other tables that hold one row a thing
+  kAll      // also those that grow: configurations, alarms, measurements, ended intents, the audit
+};
+
+/// The place of a row as the disk has it.
+StoredPlace PlaceOf(const VectorRow& vector);
+
+/// Enters the rows of one transaction, of which ends of intents are written last.
+void Enter(std::span<const Row> rows, Extent extent, StoredPicture* picture);
+
+/// The first thing in which the two differ, for people; empty: nothing.
+std::string FirstDifference(const StoredPicture& acknowledged, const StoredPicture& read);
 
 class PictureReader {
  public:
   PictureReader() : disk_("focalfleet-picture") {}
   /// None: the picture is no store (it was never written, or it is damaged); `why` says so.
-  std::optional<StoredPicture> Read(DiskPicture picture, std::string* why);
+  std::optional<StoredPicture> Read(DiskPicture picture, Extent extent, std::string* why);
 
  private:
   MemoryDisk disk_;

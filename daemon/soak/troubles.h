@@ -13,11 +13,12 @@ namespace focalfleet::soak {
 struct Troubles {
   static constexpr HostInstant kLongAgo{INT64_MIN};
 
-  HostInstant host = kLongAgo;                  // it was dead, frozen, or slow until then
-  HostInstant store = kLongAgo;                 // the disk failed until then
-  std::vector<HostInstant> buses;               // by index of the layout's buses
-  std::vector<HostInstant> deaf;                // units that a stop does not reach
-  std::vector<HostInstant> units;               // units that misbehave otherwise
+  HostInstant host = kLongAgo;     // it was dead, frozen, or finding its feet until then
+  HostInstant away = kLongAgo;     // the last instant at which it was dead or frozen
+  HostInstant store = kLongAgo;    // the disk failed until then
+  std::vector<HostInstant> buses;  // by index of the layout's buses
+  std::vector<HostInstant> deaf;   // units that a stop does not reach
+  std::vector<HostInstant> units;  // units that misbehave otherwise
   std::vector<std::vector<HostInstant>> jumps;  // power cuts: the rotor may jump by half a turn
   std::vector<HostInstant> counts_lost;  // FLASH had the counts of an earlier time from then on
 

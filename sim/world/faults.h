@@ -3,6 +3,8 @@
 // world's seed.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -15,6 +17,20 @@ namespace focalfleet::sim {
 
 /// The misbehaviour of one unit towards the host. Its motors are not affected.
 struct UnitFaults {
+  enum class Kind : std::uint8_t {
+    kSilent,
+    kDeaf,
+    kLate,
+    kCopies,
+    kWrongDigest,
+    kMuteDone,
+    kForeignSerial,
+    kInMotion,
+    kIgnores,
+    kRefuses,
+    kStaleSequence,
+    kCount
+  };
   bool silent = false;        // receives and acts, but never sends
   bool deaf = false;          // receives nothing
   bool deaf_to_sync = false;  // its SYNC wire is broken
@@ -50,6 +66,13 @@ struct UnitFaults {
   std::optional<Sensor> sensor;
   // At the start of a move that it holds it stays where it is, and reports `arrived`.
   bool claims_arrival = false;
+
+  /// How often a fault has changed what the unit took in, did or said.
+  std::array<std::uint32_t, static_cast<std::size_t>(Kind::kCount)> acted{};
+  void Acts(Kind kind) { ++acted[static_cast<std::size_t>(kind)]; }
+  [[nodiscard]] std::uint32_t Acted(Kind kind) const {
+    return acted[static_cast<std::size_t>(kind)];
+  }
 };
 
 /// Damage of a unit's FLASH, done at once.
@@ -66,6 +89,15 @@ struct BusFaults {
   double duplicate = 0;
   double late = 0;  // the frame enters arbitration only after `late_by`
   DurationNs late_by = Milliseconds(5);
+
+  /// The frames that each has touched.
+  struct Acted {
+    std::uint32_t noise = 0;
+    std::uint32_t drop = 0;
+    std::uint32_t duplicate = 0;
+    std::uint32_t late = 0;
+  };
+  Acted acted = {};
 };
 
 }  // namespace focalfleet::sim

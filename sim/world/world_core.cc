@@ -213,16 +213,23 @@ void WorldCore::Deliver(Wire& segment, const Bus::Heard& heard) {
 void WorldCore::DeliverTo(std::uint32_t row, const Bus::Heard& heard) {
   const std::uint32_t node = node_of_row_[row];
   if (!segments_[bus_of_row_[row]].bus.node(node).hears() || heard.but_not == node) return;
-  if (units_[row]->faults().deaf) return;
+  if (units_[row]->faults().deaf) {
+    units_[row]->faults().Acts(UnitFaults::Kind::kDeaf);
+    return;
+  }
   TransmitQueue out;
   units_[row]->OnFrame(heard.sent.frame, now_, &out);
   Send(row, out);
 }
 
 void WorldCore::Send(std::uint32_t row, const TransmitQueue& out) {
-  const UnitFaults& faults = units_[row]->faults();
+  UnitFaults& faults = units_[row]->faults();
   Wire& segment = segments_[bus_of_row_[row]];
-  if (!faults.silent && !out.frames().empty()) {
+  if (faults.silent && !out.frames().empty()) {
+    faults.Acts(UnitFaults::Kind::kSilent);
+  } else if (!out.frames().empty()) {
+    if (faults.late.ns > 0) faults.Acts(UnitFaults::Kind::kLate);
+    if (faults.copies > 1) faults.Acts(UnitFaults::Kind::kCopies);
     const HostInstant ready = now_ + config_.answer_delay + faults.late;
     for (const CanFrame& frame : out.frames())
       for (int copy = 0; copy < faults.copies; ++copy)

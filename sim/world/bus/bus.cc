@@ -22,8 +22,10 @@ bool Bus::Offer(const WaitingFrame& waiting, HostInstant ready) {
     return false;
   }
   if (faults_.late > 0 && arbitration_.TakesPart(nodes_[waiting.node()]) &&
-      chance_.Uniform() < faults_.late)
+      chance_.Uniform() < faults_.late) {
     ready = ready + faults_.late_by;
+    ++faults_.acted.late;
+  }
   return arbitration_.Offer(waiting, ready, nodes_);
 }
 
@@ -94,11 +96,13 @@ FrameOnWire Bus::DrawCourse(const Arbitration::Winner& winner) {
           DisturbedAt(frame, static_cast<std::uint32_t>(first),
                       nodes_[sender].errors.state() == Confinement::kPassive);
       if (course.accepted || disturbed.bits < course.bits) course = disturbed;
+      ++faults_.acted.noise;
     }
   }
   if (faults_.duplicate > 0 && course.error == FrameError::kNone &&
       chance_.Uniform() < faults_.duplicate) {
     course = RefusedByOne(frame);
+    ++faults_.acted.duplicate;
     if (!options_.bit_clock) course.bits = 0;
     if (nodes_.hearing() > 2) drawn.refusing = nodes_.DrawReceiver(sender, &chance_);
   }
@@ -129,7 +133,10 @@ bool Bus::EndFrame(Heard* heard) {
   ++(heard->sent.from_unit ? counters_.unit_frames : counters_.host_frames);
   if (frame.babbling) ++counters_.babbled;
   heard->lost = faults_.drop > 0 && chance_.Uniform() < faults_.drop;
-  if (heard->lost) arbitration_.CountDropped();
+  if (heard->lost) {
+    arbitration_.CountDropped();
+    ++faults_.acted.drop;
+  }
   return true;
 }
 

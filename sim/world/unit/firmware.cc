@@ -156,6 +156,7 @@ void Firmware::TripIfDue(HostInstant now, TransmitQueue* out) {
   if (trip_at_ > now || trip_at_ >= machine_.end_at()) return;
   const Trip trip{hardware_.faults->in_motion->code, hardware_.faults->in_motion->axis};
   hardware_.faults->in_motion.reset();
+  hardware_.faults->Acts(UnitFaults::Kind::kInMotion);
   RaiseFault(trip, now, out);
 }
 
@@ -172,7 +173,10 @@ bool Firmware::Withheld(const CanFrame& frame, HostInstant now, TransmitQueue* o
   if (node == hardware_.node && request->address.sequence != sequence_)
     sequence_before_ = std::exchange(sequence_, request->address.sequence);
   const auto function = static_cast<Function>(frame.id >> 20 & 63);
-  if (faults.ignores == function) return true;
+  if (faults.ignores == function) {
+    faults.Acts(UnitFaults::Kind::kIgnores);
+    return true;
+  }
   if (faults.loses_segments > 0 && function == Function::kStageSegment) {
     --faults.loses_segments;
     return true;
@@ -188,6 +192,7 @@ bool Firmware::Withheld(const CanFrame& frame, HostInstant now, TransmitQueue* o
     return true;
   }
   if (!faults.refuses || faults.refuses->what != function) return false;
+  faults.Acts(UnitFaults::Kind::kRefuses);
   if (const auto refusal = Refused(*request, now))
     out->Add(Encode(*refusal, {hardware_.node, request->address.sequence}));
   return true;
@@ -218,28 +223,36 @@ std::optional<UnitMessage> Firmware::Refused(const Addressed<HostMessage>& reque
 void Firmware::Pass(const TransmitQueue& said, Cause cause, TransmitQueue* out) const {
   for (const CanFrame& frame : said.frames()) {
     // The only frame that comes with time is the end of a motion.
-    if (cause == Cause::kTime && hardware_.faults->mute_done) continue;
+    if (cause == Cause::kTime && hardware_.faults->mute_done) {
+      hardware_.faults->Acts(UnitFaults::Kind::kMuteDone);
+      continue;
+    }
     out->Add(Distorted(frame));
   }
 }
 
 CanFrame Firmware::Distorted(const CanFrame& frame) const {
-  const UnitFaults& faults = *hardware_.faults;
+  UnitFaults& faults = *hardware_.faults;
   if (!faults.wrong_digest && !faults.foreign_serial && !faults.stale_sequence &&
       !faults.protocol_version)
     return frame;
   auto decoded = DecodeUnit(frame);
   if (!decoded) return frame;
   if (auto* confirm = std::get_if<ConfirmReply>(&decoded->message);
-      confirm != nullptr && faults.wrong_digest)
+      confirm != nullptr && faults.wrong_digest) {
     confirm->digest ^= 0x00ff00ffu;
+    faults.Acts(UnitFaults::Kind::kWrongDigest);
+  }
   if (auto* identify = std::get_if<IdentifyReply>(&decoded->message)) {
+    if (faults.foreign_serial) faults.Acts(UnitFaults::Kind::kForeignSerial);
     identify->serial = faults.foreign_serial.value_or(identify->serial);
     identify->protocol_version = faults.protocol_version.value_or(identify->protocol_version);
   }
   // Sequence number 0 belongs to frames that are sent unasked.
-  if (faults.stale_sequence && decoded->address.sequence != 0)
+  if (faults.stale_sequence && decoded->address.sequence != 0) {
+    faults.Acts(UnitFaults::Kind::kStaleSequence);
     decoded->address.sequence = sequence_before_;
+  }
   return Encode(decoded->message, decoded->address);
 }
 
