@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "protocol/base/limits.h"
+
 namespace focalfleet {
 namespace {
 
@@ -69,6 +71,11 @@ Status CheckRight(const Caller& caller, std::string_view verb, const nlohmann::j
   return Fail(ErrorCode::kRefused, Describe(caller) + " may not " + right->verb +
                                        (flagged ? std::string(" with ") + right->flag : "") +
                                        ": it takes the role " + Name(least));
+}
+
+std::size_t LineBytesMaxOf(Role role) {
+  if (role >= RightOf("model_load")->least) return limits::kModelLineBytes;
+  return role >= RightOf("apply")->least ? limits::kControlLineBytes : limits::kViewerLineBytes;
 }
 
 nlohmann::json AccessJson(const Caller& caller) {

@@ -3,9 +3,11 @@
 // that is not in it does not exist.
 //
 // A flag of a request may need more than its verb: homing without a proof of a clear way is the
-// engineer's risk.
+// engineer's risk. A role also limits the length of a line: who may not load a model sends none,
+// and its line is refused before anything of it is parsed.
 #pragma once
 
+#include <cstddef>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string_view>
@@ -33,6 +35,9 @@ const Right* RightOf(std::string_view verb);
 /// Errors: kInvalid: there is no such verb; kRefused: names caller, verb and the role that it
 /// needs.
 Status CheckRight(const Caller& caller, std::string_view verb, const nlohmann::json& args);
+
+/// Limit of a line from a caller of this role. Units: bytes.
+std::size_t LineBytesMaxOf(Role role);
 
 /// {name, door, role, verbs}: what the caller may do. A verb is {verb, changes, least, allowed},
 /// and where a flag of it needs more, {flag, flag_least, flag_allowed}.

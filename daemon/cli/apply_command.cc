@@ -14,6 +14,7 @@
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table_input.h"
 #include "fleet/files/targets_file.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -94,11 +95,12 @@ ExitCode ReportDryRun(const Context& context, const tl::expected<Json, Failure>&
 ExitCode RunApply(const Context& context, const ApplyOptions& options) {
   auto text = ReadTable(context, options.file, "unit_id");
   if (!text) return Report(context, text.error());
-  // The rest of the line and the escapes of its text must fit, too.
-  if (text->size() > kControlLineBytesMax / 2) {
+  constexpr std::size_t kRestOfLine = 4096;
+  const std::size_t bytes = EncodeText(*text).size() + kRestOfLine;
+  if (bytes > limits::kControlLineBytes) {
     return Report(context, {ErrorCode::kInvalid,
-                            fmt::format("{}: {} bytes; the daemon takes at most {}", options.file,
-                                        text->size(), kControlLineBytesMax / 2)});
+                            fmt::format("{}: a request of {} bytes; the daemon takes at most {}",
+                                        options.file, bytes, limits::kControlLineBytes)});
   }
   // The daemon reports errors in the file. Only this program can report the columns that are
   // ignored.

@@ -8,6 +8,7 @@
 #include "daemon/cli/confirm.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -111,10 +112,10 @@ ExitCode RunLoad(const Context& context, const LoadOptions& options) {
   const auto text = ReadTextFile(file);
   if (!text) return Report(context, text.error());
   // The rest of the line and the escapes of its text must fit, too.
-  if (text->size() > kControlLineBytesMax / 2)
-    return Report(context,
-                  {ErrorCode::kInvalid, fmt::format("{}: {} bytes; the daemon takes at most {}",
-                                                    file, text->size(), kControlLineBytesMax / 2)});
+  if (text->size() > limits::kModelLineBytes / 2)
+    return Report(context, {ErrorCode::kInvalid,
+                            fmt::format("{}: {} bytes; the daemon takes at most {}", file,
+                                        text->size(), limits::kModelLineBytes / 2)});
   constexpr const char* kWhat = "from now on blind commands go through another model";
   if (const auto refused = Refused(kWhat, options.yes)) return Report(context, *refused);
   return Change(context, "model_load", {{"model_toml", *text}, {"source", SourceOf(file)}});

@@ -30,6 +30,11 @@ constexpr std::uint64_t kResume = kAgain - 1;
 /// between.
 constexpr int kAcceptsPerTurn = 16;
 
+std::size_t LineBytesMax(const LineServer::Options& options, const ServerClient& client) {
+  return options.line_bytes_max_of ? options.line_bytes_max_of(client.caller.role)
+                                   : options.line_bytes_max;
+}
+
 bool NoDescriptor(int error) { return error == EMFILE || error == ENFILE; }
 bool NoRoom(int error) { return NoDescriptor(error) || error == ENOBUFS || error == ENOMEM; }
 
@@ -285,7 +290,7 @@ void LineServer::Impl::Service(std::vector<IncomingLine>* urgent) {
     const ClientId id = it->first;
     Client& client = it->second;
     ++it;
-    client.CheckLength(options_.line_bytes_max);
+    client.CheckLength(LineBytesMax(options_, client));
     if (!Settle(id, &client)) Drop(id);
   }
   // Accept comes after the clients were read: a client that has just sent a line is not idle.
@@ -304,7 +309,7 @@ std::optional<IncomingLine> LineServer::Impl::Next() {
     Client& client = it->second;
     ++it;
     if (!client.Ready(options_.output_bytes_pause)) continue;
-    if (client.CheckLength(options_.line_bytes_max)) {
+    if (client.CheckLength(LineBytesMax(options_, client))) {
       auto line = client.input.Take();
       ++client.open;
       client.active = ++active_;
@@ -334,13 +339,17 @@ bool LineServer::Impl::Queue(ClientId id, std::string_view line, bool last) {
   const auto it = clients_.find(id);
   if (it == clients_.end()) return false;
   Client& client = it->second;
+  const bool was_ready = client.Ready(options_.output_bytes_pause);
   if (last && client.open > 0) --client.open;
   client.active = ++active_;
   if (client.closing || (!last && client.waiting() > options_.progress_bytes_max)) return true;
   client.output.append(line).push_back('\n');
-  if (Settle(id, &client)) return true;
-  Drop(id);
-  return false;
+  if (!Settle(id, &client)) {
+    Drop(id);
+    return false;
+  }
+  if (!was_ready && client.Ready(options_.output_bytes_pause)) Remind();
+  return true;
 }
 
 LineServer::LineServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

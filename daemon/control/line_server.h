@@ -2,8 +2,9 @@
 // a client. control/listening_socket.h makes the socket file.
 //
 // The length of a line, the number of clients and the unread output of a client are bounded.
-// Clients take turns. No line of a client is taken while much of its earlier answers is unread, so
-// a client that asks without reading stops itself. All descriptors are in one inner epoll, so that
+// Clients take turns. No line of a client is taken while much of its earlier answers is unread, or
+// limits::kControlRequestsOpen of its lines are not answered, so a client that asks without reading
+// or waiting stops itself. All descriptors are in one inner epoll, so that
 // an event loop watches a single one.
 //
 // A line may be urgent (`Options::urgent`). Such a line is handed out before all others, even from
@@ -35,7 +36,9 @@ namespace focalfleet {
 class LineServer final : public LineExchange {
  public:
   struct Options {
-    std::size_t line_bytes_max = kControlLineBytesMax;
+    std::size_t line_bytes_max = limits::kControlLineBytes;
+    /// The limit of a client by its role, in place of line_bytes_max.
+    std::function<std::size_t(Role)> line_bytes_max_of = {};
     std::size_t output_bytes_max = std::size_t{64}
                                    << 20;  // more than this waits: the client is dropped
     std::size_t output_bytes_pause = std::size_t{1}

@@ -1,5 +1,6 @@
 #include "daemon/control/messages.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -68,6 +69,18 @@ Result<Json> ParseObject(std::string_view line, std::size_t values_max) {
   return json;
 }
 
+/// Whether the line may be a model: the verb stands before its arguments or behind them, so near an
+/// end of the line.
+bool MayBeAModel(std::string_view line) {
+  constexpr std::string_view kVerb = "\"model_load\"";
+  constexpr std::size_t kNear = 512;
+  const auto names_it = [](std::string_view part) {
+    return part.find(kVerb) != std::string_view::npos;
+  };
+  return names_it(line.substr(0, kNear)) ||
+         names_it(line.substr(line.size() - std::min(kNear, line.size())));
+}
+
 /// {token, role, address}, all of them texts.
 Result<Caller> CallerOf(const Json& object) {
   const auto text = [&](const char* name) {
@@ -110,6 +123,9 @@ Result<Json> DecodeObject(std::string_view text) {
 }
 
 Result<ControlRequest> DecodeRequest(std::string_view line) {
+  if (line.size() > limits::kControlLineBytes && !MayBeAModel(line))
+    return Malformed("more than " + std::to_string(limits::kControlLineBytes) +
+                     " bytes, which a model alone may have");
   FOCALFLEET_TRY_ASSIGN(Json json, ParseObject(line, limits::kControlValues));
   ControlRequest request;
   FOCALFLEET_TRY_ASSIGN(request.id, IdOf(json));
@@ -166,8 +182,14 @@ std::string EncodeRequest(const ControlRequest& request) {
   return Dump(object);
 }
 
+std::string EncodeText(const Json& json) { return Dump(json); }
+
+std::string ProgressLine(std::uint64_t id, std::string_view text) {
+  return R"({"id":)" + std::to_string(id) + R"(,"progress":)" + std::string(text) + "}";
+}
+
 std::string EncodeProgress(std::uint64_t id, const Json& progress) {
-  return Dump({{"id", id}, {"progress", progress}});
+  return ProgressLine(id, Dump(progress));
 }
 
 std::string EncodeResult(std::uint64_t id, const Json& result) {

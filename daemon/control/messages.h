@@ -8,7 +8,8 @@
 //
 // All functions are total: any bytes give a request or an Error, and nothing throws. Depth and
 // number of a line's values are bounded before it is parsed (limits::kControlDepth,
-// kControlValues), because on the core thread a short line must not cost much.
+// kControlValues), because on the core thread a short line must not cost much. Its length is
+// bounded, too: a model alone may have more than limits::kControlLineBytes.
 #pragma once
 
 #include <cstdint>
@@ -28,10 +29,6 @@ using Json = nlohmann::json;
 
 /// The number; null where it is not finite, which JSON cannot say.
 Json Number(double value);
-
-/// Limit of a request line. A targets file of 32,768 units is about 1 MiB, a model of as many units
-/// is several MiB.
-inline constexpr std::size_t kControlLineBytesMax = std::size_t{16} << 20;
 
 struct ControlRequest {
   std::uint64_t id = 0;
@@ -64,6 +61,9 @@ Result<ControlAnswer> DecodeAnswer(std::string_view line);
 /// null.
 std::string EncodeRequest(const ControlRequest& request);
 std::string EncodeProgress(std::uint64_t id, const Json& progress);
+/// The same for a progress that many clients get: `text` is EncodeText of it.
+std::string ProgressLine(std::uint64_t id, std::string_view text);
+std::string EncodeText(const Json& json);
 std::string EncodeResult(std::uint64_t id, const Json& result);
 std::string EncodeError(std::uint64_t id, const Error& error);
 

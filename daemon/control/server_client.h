@@ -8,6 +8,7 @@
 
 #include "daemon/access/caller.h"
 #include "daemon/control/line_buffer.h"
+#include "protocol/base/limits.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet {
@@ -28,12 +29,16 @@ struct ServerClient {
 
   /// Units: bytes of output that the client has not read yet.
   [[nodiscard]] std::size_t waiting() const { return output.size() - written; }
-  /// Whether the client's lines are taken: at most `bytes_pause` of its answers wait.
+  /// Whether the client reads its answers: at most `bytes_pause` of them wait.
   [[nodiscard]] bool Listens(std::size_t bytes_pause) const {
     return !closing && waiting() <= bytes_pause;
   }
+  /// Whether a line of the client is taken now. Lines beyond limits::kControlRequestsOpen wait
+  /// until one is answered. A client that closed does not keep its place until then: all that it
+  /// has sent is taken.
   [[nodiscard]] bool Ready(std::size_t bytes_pause) const {
-    return input.has_line() && Listens(bytes_pause);
+    return input.has_line() && Listens(bytes_pause) &&
+           (open < limits::kControlRequestsOpen || deaf);
   }
   /// Whether the client may lose its place: no request of it is open, and nothing that it sent
   /// waits, unless it does not read its answers.

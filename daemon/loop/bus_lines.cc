@@ -1,11 +1,16 @@
 #include "daemon/loop/bus_lines.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "daemon/ports/socket_frames.h"
 #include "protocol/base/check.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 namespace {
+
+static_assert(limits::kFramesPerStep >= 64 * kFramesPerReceive, "64 buses are read whole");
 
 /// No frame gets through, and waiting frames would be stale when the link lives again.
 bool Dead(LinkState state) { return state == LinkState::kDown || state == LinkState::kOff; }
@@ -28,8 +33,20 @@ std::size_t BusLines::IndexOf(BusId bus) const {
 
 void BusLines::Receive(HostInstant now, std::vector<ReceivedFrame>* frames,
                        std::vector<LinkEvent>* links) {
-  for (Line& line : lines_) {
-    if (line.ready || line.port->wake_at() <= now) line.port->Receive(now, frames);
+  const std::size_t most = frames->size() + limits::kFramesPerStep;
+  const std::size_t first = first_;
+  left_ = false;
+  for (std::size_t n = 0; n < lines_.size(); ++n) {
+    const std::size_t at = (first + n) % lines_.size();
+    Line& line = lines_[at];
+    if (line.ready || line.port->wake_at() <= now) {
+      if (frames->size() >= most) {
+        line.ready = true;
+        if (!std::exchange(left_, true)) first_ = at;
+        continue;
+      }
+      line.port->Receive(now, frames);
+    }
     line.ready = false;
     const LinkState state = line.port->state();
     // A link that is down may have one trouble after another; only the first one is reported.
@@ -58,7 +75,7 @@ void BusLines::Flush(const HostClock& clock) {
 }
 
 HostInstant BusLines::wake_at(HostInstant now, const HostClock& clock) const {
-  HostInstant at = kNever;
+  HostInstant at = left_ ? now : kNever;
   for (const Line& line : lines_) {
     at = std::min(at, line.port->wake_at());
     const bool dead = Dead(line.port->state());

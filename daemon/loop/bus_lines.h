@@ -1,5 +1,9 @@
 // All buses as the event loop sees them: frames that came in, links that changed, frames that have
 // to go out. A line is a port with its transmit queue; only lines with something to do are touched.
+//
+// A turn takes limits::kFramesPerStep frames, or the rest of the port that reaches it. The lines
+// that it leaves are the first of the next turn, which is due at once. Up to 64 buses are read
+// whole: otherwise units could count as silent while their answers wait.
 #pragma once
 
 #include <memory>
@@ -23,8 +27,8 @@ class BusLines {
   [[nodiscard]] int fd(std::size_t line) const { return lines_[line].port->fd(); }
   void MarkReady(std::size_t line) { lines_[line].ready = true; }
 
-  /// Appends the frames of every line that is ready or due, and the links that changed or have
-  /// another trouble. The first call appends all links.
+  /// Appends the frames of every line that is ready or due, as many as a turn takes, and the links
+  /// that changed or have another trouble. The first call appends all links.
   void Receive(HostInstant now, std::vector<ReceivedFrame>* frames, std::vector<LinkEvent>* links);
 
   /// The frame waits for its port; a frame for a dead link is discarded.
@@ -52,6 +56,8 @@ class BusLines {
   [[nodiscard]] std::size_t IndexOf(BusId bus) const;
 
   std::vector<Line> lines_;
+  std::size_t first_ = 0;  // line that is received first
+  bool left_ = false;      // the last turn left lines that are ready or due
 };
 
 }  // namespace focalfleet

@@ -129,9 +129,12 @@ void Shell::Perform() {
   if (parts_.metrics != nullptr) parts_.metrics->Note(View(), effects_);
   const WallTime now = parts_.clock.Wall();
   parts_.alarms->Take(now, &effects_.rows);
-  parts_.audit->Take(effects_.replies,
-                     parts_.coordinator->busy() ? parts_.coordinator->configuration().id : 0, now,
-                     &effects_.rows);
+  parts_.audit->Take(
+      effects_.replies,
+      {.configuration = parts_.coordinator->busy() ? parts_.coordinator->configuration().id : 0,
+       .now = now,
+       .full = !parts_.store->RoomForRows()},
+      &effects_.rows);
   if (!effects_.rows.empty()) {
     // Entries of the audit alone belong to no batch of the coordinator: they go with its last one.
     last_batch_ = std::max(last_batch_, effects_.batch);

@@ -36,6 +36,7 @@ class StoreThread {
   [[nodiscard]] std::optional<Error> failure() const { return writer_.failure(); }
   std::vector<RefusedRow> TakeRefused() { return writer_.TakeRefused(); }
   [[nodiscard]] std::size_t waiting() const { return writer_.waiting(); }
+  [[nodiscard]] Status RoomForRows() const { return writer_.RoomForRows(); }
 
   /// A thread that sleeps takes a turn.
   void Wake() const { wake_.Raise(); }

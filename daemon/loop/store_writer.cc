@@ -5,7 +5,9 @@
 #include <utility>
 #include <variant>
 
+#include "daemon/loop/row_bytes.h"
 #include "fleet/row_check.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 namespace {
@@ -33,8 +35,22 @@ StoreWriter::StoreWriter(Sinks sinks)
 // ---- called by the core
 
 void StoreWriter::Commit(std::uint64_t batch, std::vector<Row> rows) {
-  held_.push_back({batch, batch, std::move(rows), sinks_.wall()});
+  const std::size_t bytes = BytesOf(rows);
+  bytes_waiting_ += bytes;
+  held_.push_back({batch, batch, std::move(rows), sinks_.wall(), bytes});
   HandOver();
+}
+
+Status StoreWriter::RoomForRows() const {
+  constexpr std::size_t kMiB = std::size_t{1} << 20;
+  const std::size_t bytes = bytes_waiting_;
+  if (bytes <= limits::kRowBytesWaiting) return {};
+  const auto why = failure();
+  return Fail(ErrorCode::kUnavailable, "it cannot be stored: " + std::to_string(bytes / kMiB) +
+                                           " MiB of rows wait for the store already, at most " +
+                                           std::to_string(limits::kRowBytesWaiting / kMiB) +
+                                           " may" + (why ? " (" + why->text + ")" : "") +
+                                           "; nothing was changed");
 }
 
 void StoreWriter::HandOver() {
@@ -94,6 +110,7 @@ void StoreWriter::Gather() {
       continue;
     }
     open_.number = next->number;
+    open_.bytes += next->bytes;
     open_.rows.insert(open_.rows.end(), std::make_move_iterator(next->rows.begin()),
                       std::make_move_iterator(next->rows.end()));
   }
@@ -118,6 +135,7 @@ bool StoreWriter::TryCommit(bool ending) {
   for (const Row& row : open_.rows)
     if (const auto* alarm = std::get_if<AlarmRow>(&row)) sinks_.alarm({open_.at, *alarm});
   open_.rows.clear();
+  bytes_waiting_ -= std::exchange(open_.bytes, 0);
   attempted_ = false;
   committed_through_ = open_.number;
   if (failing_.exchange(false) && sinks_.log_info)

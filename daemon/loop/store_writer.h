@@ -9,6 +9,9 @@
 // Waiting batches become one transaction, in order. Thereby the writer falls behind a slow disk by
 // no more than one flush.
 //
+// Rows are kept in memory until they are durable, so a disk that stays full would fill the memory,
+// too. RoomForRows says when so many wait that no command may add others.
+//
 // A thread offers batches and status, and the other one, or the same, takes the turns.
 #pragma once
 
@@ -83,6 +86,11 @@ class StoreWriter {
   [[nodiscard]] std::size_t waiting() const { return batches_.size() + held_.size(); }
   /// Batches that found the queue full.
   [[nodiscard]] std::size_t held() const { return held_.size(); }
+  /// Memory of the rows that are not durable yet (loop/row_bytes.h).
+  [[nodiscard]] std::size_t bytes_waiting() const { return bytes_waiting_; }
+  /// A command may add rows. Errors: kUnavailable: limits::kRowBytesWaiting are exceeded, with the
+  /// reason.
+  [[nodiscard]] Status RoomForRows() const;
 
   // ---- called by the thread that takes the turns
 
@@ -101,6 +109,7 @@ class StoreWriter {
     std::uint64_t number = 0;  // last of them
     std::vector<Row> rows;
     WallTime at;
+    std::size_t bytes = 0;  // of all its rows, also of those that were set aside since
   };
 
   void Gather();
@@ -116,6 +125,7 @@ class StoreWriter {
   SpscQueue<StatusBatch> statuses_;
   std::deque<Batch> held_;  // used by the core alone
   std::atomic<std::uint64_t> committed_through_{0};
+  std::atomic<std::size_t> bytes_waiting_{0};
   std::atomic<bool> failing_{false};
 
   mutable std::mutex lock_;

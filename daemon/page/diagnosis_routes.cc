@@ -51,8 +51,8 @@ Result<DiagnosisJob::Campaign> CampaignIn(const HttpRequest& request, const Reco
   DiagnosisJob::Campaign campaign{
       .name = {}, .moves_csv = {}, .units_csv = {}, .by = NameOf(caller)};
   FOCALFLEET_TRY_ASSIGN(campaign.name, TextArgument(args, "name"));
-  FOCALFLEET_TRY_ASSIGN(campaign.moves_csv, TextArgument(args, "moves_csv", kControlLineBytesMax));
-  FOCALFLEET_TRY_ASSIGN(campaign.units_csv, TextArgument(args, "units_csv", kControlLineBytesMax));
+  FOCALFLEET_TRY_ASSIGN(campaign.moves_csv, TextArgument(args, "moves_csv", request.body.size()));
+  FOCALFLEET_TRY_ASSIGN(campaign.units_csv, TextArgument(args, "units_csv", request.body.size()));
   return campaign;
 }
 

@@ -61,7 +61,7 @@ Result<PlaneApplyCommand> PlaneApplyOf(const PlaneInstant& plane, const Json& ar
   FOCALFLEET_TRY_ASSIGN(command.source, TextArgumentOr(args, "source", "targets"));
   FOCALFLEET_TRY_ASSIGN(command.fixed, FlagArgumentOr(args, "fixed", false));
   FOCALFLEET_TRY_ASSIGN(const std::string csv,
-                        TextArgument(args, "targets_csv", kControlLineBytesMax));
+                        TextArgument(args, "targets_csv", limits::kControlLineBytes));
   FOCALFLEET_TRY(CheckLines(csv, command.source, std::size_t{2} * limits::kUnits));
   FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(csv, command.source));
   const Layout& layout = plane.plane->layout();

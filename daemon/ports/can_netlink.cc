@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "daemon/ports/bounded_question.h"
 #include "daemon/ports/socket_opener.h"
 
 namespace focalfleet {
@@ -22,6 +23,9 @@ constexpr std::uint32_t kEchoFlag = 1u << 18;  // IFF_ECHO, which net/if.h lacks
 constexpr std::uint16_t kCanHardware = 280;    // ARPHRD_CAN, which net/if_arp.h lacks
 constexpr std::size_t kAnswerMax = 32'768;
 constexpr std::uint16_t kTypeMask = 0x3fff;  // NLA_TYPE_MASK, which is an int
+/// An answer that was lost on its way (a full buffer) must not hold a thread for ever. An order to
+/// a driver takes up to a second.
+constexpr timeval kAnswerLost{.tv_sec = 5, .tv_usec = 0};
 
 // ---- writing
 
@@ -150,6 +154,7 @@ Result<NetlinkMessage> AskKernel(const NetlinkMessage& request) {
   const int fd = MakeSocket(SocketKind::kNetlink);
   if (fd < 0)
     return Fail(ErrorCode::kUnavailable, std::string("no netlink: ") + std::strerror(errno));
+  ::setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &kAnswerLost, sizeof kAnswerLost);
   NetlinkMessage answer(kAnswerMax);
   ssize_t got = ::send(fd, request.data(), request.size(), 0);
   if (got >= 0) {
@@ -163,6 +168,21 @@ Result<NetlinkMessage> AskKernel(const NetlinkMessage& request) {
     return Fail(ErrorCode::kUnavailable, std::string("netlink: ") + std::strerror(error));
   answer.resize(static_cast<std::size_t>(got));
   return answer;
+}
+
+/// The process has a single one: a lock of the kernel holds up all interfaces alike.
+BoundedQuestion& QuestionInTime() {
+  static BoundedQuestion question({});
+  return question;
+}
+
+Result<CanLink> LinkIn(const NetlinkMessage& answer, const std::string& interface) {
+  auto link = ReadLink(answer);
+  if (!link)
+    return Fail(ErrorCode::kUnavailable,
+                "no CAN interface '" + interface + "': " + link.error().text);
+  if (!link->can) return Fail(ErrorCode::kUnavailable, "'" + interface + "' is no CAN interface");
+  return link;
 }
 
 Result<int> Order(const NetlinkMessage& order) {
@@ -251,12 +271,14 @@ Result<CanLink> ReadLink(std::span<const std::byte> answer) {
 Result<CanLink> LookAtLink(const std::string& interface) {
   FOCALFLEET_TRY_ASSIGN(const NetlinkMessage question, QuestionAboutLink(interface));
   FOCALFLEET_TRY_ASSIGN(const NetlinkMessage answer, AskKernel(question));
-  auto link = ReadLink(answer);
-  if (!link)
-    return Fail(ErrorCode::kUnavailable,
-                "no CAN interface '" + interface + "': " + link.error().text);
-  if (!link->can) return Fail(ErrorCode::kUnavailable, "'" + interface + "' is no CAN interface");
-  return link;
+  return LinkIn(answer, interface);
+}
+
+Result<CanLink> LookAtLinkInTime(const std::string& interface) {
+  FOCALFLEET_TRY_ASSIGN(NetlinkMessage question, QuestionAboutLink(interface));
+  const auto ask = [question = std::move(question)] { return AskKernel(question); };
+  FOCALFLEET_TRY_ASSIGN(const NetlinkMessage answer, QuestionInTime()(ask));
+  return LinkIn(answer, interface);
 }
 
 Status ReviveLink(const std::string& interface, bool* taken_down) {

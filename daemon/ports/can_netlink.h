@@ -2,8 +2,10 @@
 // Messages are built and read without a socket, so they can be tested without CAN. The kernel's
 // answers are bounds-checked like data from a stranger.
 //
-// A question costs two system calls and is answered at once. The orders may wait for a driver (up
-// to a second), so they never run on the core thread (link_recovery.h).
+// A question costs two system calls and is answered at once, unless the kernel is busy with an
+// order about another interface. The core thread therefore asks with a limit
+// (bounded_question.h). The orders may wait for a driver (up to a second), so they never run on the
+// core thread (link_recovery.h).
 #pragma once
 
 #include <cstddef>
@@ -70,6 +72,9 @@ Result<int> ReadAcknowledgement(std::span<const std::byte> answer);
 /// Errors: kUnavailable: no such interface, or not a CAN interface (named); kInvalid: none can have
 /// this name.
 Result<CanLink> LookAtLink(const std::string& interface);
+/// The same for the core thread, which waits some 20 ms at most. Errors: also kUnavailable: there
+/// is no answer by then.
+Result<CanLink> LookAtLinkInTime(const std::string& interface);
 
 /// Brings a controller back from bus-off: by a restart where the driver has one, else by taking the
 /// interface down and up. May wait for the driver. `taken_down` is the caller's memory of one

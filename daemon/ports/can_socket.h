@@ -28,8 +28,8 @@ struct OpenedInterface {
 };
 
 /// The socket of an interface.
-/// Errors: kUnavailable: the kernel has no CAN, or no such interface (named); kInvalid: none can
-/// have this name.
+/// Errors: kUnavailable: the kernel has no CAN, or no such interface (named), or does not answer in
+/// time; kInvalid: none can have this name.
 Result<OpenedInterface> OpenInterface(const std::string& name, const Listening& listening);
 /// A function like OpenInterface. Tests on a kernel without CAN supply another one.
 using InterfaceOpener =

@@ -305,11 +305,12 @@ void SocketCanPort::SetState(LinkState state, HostInstant now) {
 }
 
 // Asks for the state of a controller that is not well, or was not when it was opened. The error
-// frame that reports recovery may be lost.
+// frame that reports recovery may be lost. Without an answer the last state stays until the next
+// look.
 void SocketCanPort::LookAgain(HostInstant now) {
   look_at_ = now + options_.clock.Real(kLookPeriod);
-  const auto link = LookAtLink(options_.interface);
-  if (!link || link->index != link_.index) return;  // gone: the socket reports it
+  const auto link = options_.look(options_.interface);
+  if (!link || link->index != link_.index) return;  // where it is gone the socket reports it
   link_ = *link;
   const LinkState state = LinkStateOf(link_);
   if (trouble_.empty()) state_ = LinkState::kUp;  // as Open left it, unreported

@@ -42,6 +42,7 @@ class SocketCanPort : public PollablePort {
     std::function<HostInstant()> wire_clock = {};
     WallAhead (*wall_ahead)() = ReadWallAhead;
     InterfaceOpener open = OpenInterface;
+    std::function<Result<CanLink>(const std::string& interface)> look = LookAtLinkInTime;
     SystemReceive receive = ::recvmmsg;
     LinkRecovery::Reviver revive = {};  // empty: ReviveLink
   };

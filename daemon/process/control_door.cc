@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "daemon/access/log_limit.h"
+#include "daemon/access/rights.h"
 #include "daemon/verbs/request_handler.h"
 
 namespace focalfleet {
@@ -25,7 +26,8 @@ Result<RoleGroups> FindRoles(const DaemonConfig::Control& control) {
 
 Result<LineServer> OpenControl(const DaemonConfig::Control& control) {
   FOCALFLEET_TRY_ASSIGN(RoleGroups groups, FindRoles(control));
-  LineServer::Options options{.urgent = &RequestHandler::IsStop};
+  LineServer::Options options{.line_bytes_max_of = &LineBytesMaxOf,
+                              .urgent = &RequestHandler::IsStop};
   // Where groups have roles, the role decides, and the file lets everybody knock.
   if (groups.in_use()) options.file_mode = 0666;
   options.role_of = [groups = std::move(groups)](const std::optional<Peer>& peer) {

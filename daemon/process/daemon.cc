@@ -205,6 +205,7 @@ Status Daemon::OpenRequestHandler() {
                               .models = models_.get(),
                               .alarms = &alarms_,
                               .audit = &doors_.audit,
+                              .room_for_rows = [this] { return stored_.writer->RoomForRows(); },
                               .own_pid = static_cast<std::uint32_t>(::getpid())});
   if (const Status restored = RestoreLastModel(); !restored)
     spdlog::error("no model is in force: {}", restored.error().text);

@@ -8,6 +8,7 @@
 
 #include "daemon/simulator/truth_report.h"
 #include "fleet/files/targets_file.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet::simulator {
 namespace {
@@ -64,7 +65,7 @@ Result<std::vector<UnitId>> Verbs::Units(const Json& args) const {
 
 Result<Json> Verbs::Truth(const Json& args) {
   FOCALFLEET_TRY_ASSIGN(const std::string text,
-                        TextArgumentOr(args, "targets_csv", "", kControlLineBytesMax));
+                        TextArgumentOr(args, "targets_csv", "", limits::kControlLineBytes));
   FOCALFLEET_TRY_ASSIGN(const std::string name, TextArgumentOr(args, "targets_name", "targets"));
   std::uint64_t begun_twice = 0;
   std::uint64_t at_work = 0;

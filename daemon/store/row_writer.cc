@@ -24,6 +24,11 @@ void BindName(Statement& s, int column, AlarmName name) {
   name == AlarmName::kUnnamed ? s.BindNull(column) : s.BindText(column, Name(name));
 }
 
+Status NoteCountedAnew(Statement& s, SerialNumber serial) {
+  s.Bind(1, serial.value);
+  return s.Run();
+}
+
 }  // namespace
 
 RowWriter::RowWriter(Statements* statements, WallTime now) : statements_(*statements), now_(now) {
@@ -52,6 +57,8 @@ Status RowWriter::Put(const VectorRow& row) {
     }
     FOCALFLEET_TRY(WriteAxis(row, axis));
   }
+  if (row.origin == Origin::kOperator || row.origin == Origin::kFound)
+    return NoteCountedAnew(statements_[Sql::kCountedAnew], row.serial);
   return {};
 }
 
@@ -117,7 +124,16 @@ Status RowWriter::Put(const IntentEndRow& row) {
   return {};
 }
 
+Status RowWriter::NoteEnd(const IntentEndRow& row) {
+  if (row.end != IntentEnd::kHomed) return {};
+  return NoteCountedAnew(statements_[Sql::kCountedAnew], row.serial);
+}
+
 Status RowWriter::Put(const BindingRow& row) {
+  Statement& replaced = statements_[Sql::kReplaced];
+  replaced.Bind(1, row.unit.value);
+  replaced.Bind(2, row.serial.value);
+  FOCALFLEET_TRY(replaced.Run());
   // A serial number belongs to one place; the place that had it before is unbound.
   for (Statement* s : {&statements_[Sql::kUnboundElsewhere], &statements_[Sql::kUnbindElsewhere],
                        &statements_[Sql::kBind]}) {

@@ -19,6 +19,9 @@ class RowWriter {
   /// The row is in the open transaction. Pre: fleet/row_check.h finds no flaw in it. Errors: as
   /// Statement::Run.
   Status Write(const Row& row);
+  /// A homing that ended counts as such at this place among the rows. The end itself is written
+  /// after all other rows of its batch.
+  Status NoteEnd(const IntentEndRow& row);
   /// The store counts its open moves as they are after all rows. Call it last.
   Status Finish();
 

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "daemon/store/audit_schema.h"
+#include "daemon/store/counted_anew_schema.h"
 
 namespace focalfleet::store_internal {
 namespace {
@@ -393,9 +394,9 @@ INSERT INTO meta(key, value, checksum) SELECT 'open_intents', count(*),
   row_checksum('open_intents', count(*)) FROM intent WHERE end IS NULL;
 )sql";
 
-constexpr const char* kMigrations[] = {kVersion1, kVersion2,  kVersion3, kVersion4,
-                                       kVersion5, kVersion6,  kVersion7, kVersion8,
-                                       kVersion9, kVersion10, kAuditStep};
+constexpr const char* kMigrations[] = {kVersion1, kVersion2,  kVersion3,  kVersion4,
+                                       kVersion5, kVersion6,  kVersion7,  kVersion8,
+                                       kVersion9, kVersion10, kAuditStep, kCountedAnewStep};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

@@ -33,6 +33,18 @@ constexpr const char* kIntentEnd =
     "(phi_end_witness, phi_end_low, phi_end_high) = "
     "(SELECT witness, low, high FROM axis_state WHERE serial = ?1 AND axis = 1) "
     "WHERE serial = ?1 AND move = ?2 AND end IS NULL";
+// Where there was never a model there is nothing to remember.
+constexpr const char* kCountedAnew =
+    "INSERT INTO counted_anew(serial, model) SELECT ?1, entry FROM model_change "
+    "WHERE entry = (SELECT max(entry) FROM model_change) "
+    "ON CONFLICT(serial) DO UPDATE SET model = excluded.model";
+// The same where the place had another serial number before.
+constexpr const char* kReplaced =
+    "INSERT INTO counted_anew(serial, model) SELECT ?2, entry FROM model_change "
+    "WHERE entry = (SELECT max(entry) FROM model_change) AND ?2 <> 0 AND "
+    "?2 <> (SELECT serial FROM unit_history WHERE unit_id = ?1 AND serial <> 0 "
+    "ORDER BY entry DESC LIMIT 1) "
+    "ON CONFLICT(serial) DO UPDATE SET model = excluded.model";
 constexpr const char* kUnboundElsewhere =
     "INSERT INTO unit_history(unit_id, serial, enabled, reason, at_ns) "
     "SELECT unit_id, 0, enabled, reason, ?3 FROM unit WHERE serial = ?2 AND unit_id <> ?1 AND ?2 "
@@ -138,6 +150,8 @@ Result<std::unique_ptr<Statements>> PrepareAll(Connection& connection) {
       {Sql::kAxisChanged, kAxisChanged},
       {Sql::kIntent, kIntent},
       {Sql::kIntentEnd, kIntentEnd},
+      {Sql::kCountedAnew, kCountedAnew},
+      {Sql::kReplaced, kReplaced},
       {Sql::kUnboundElsewhere, kUnboundElsewhere},
       {Sql::kUnbindElsewhere, kUnbindElsewhere},
       {Sql::kBind, kBind},

@@ -18,6 +18,8 @@ enum class Sql : std::uint8_t {
   kAxisChanged,
   kIntent,
   kIntentEnd,
+  kCountedAnew,
+  kReplaced,
   kUnboundElsewhere,
   kUnbindElsewhere,
   kBind,

@@ -106,8 +106,9 @@ Status Store::Commit(std::span<const Row> rows, WallTime now, std::size_t* refus
   };
   bool ends = false;
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (std::holds_alternative<IntentEndRow>(rows[k])) {
+    if (const auto* end = std::get_if<IntentEndRow>(&rows[k])) {
       ends = true;
+      if (auto noted = writer.NoteEnd(*end); !noted) return Rollback(noted.error());
     } else if (auto written = write(k); !written) {
       return Rollback(written.error());
     }

@@ -273,20 +273,12 @@ Result<std::vector<ModelHistory>> StoreReader::Models(std::uint32_t limit) {
       });
 }
 
-Result<std::vector<UnitId>> StoreReader::CountedAnewSince(WallTime since) {
-  static_assert(IntentEnd::kHomed == IntentEnd{5});
-  static_assert(Origin::kOperator == Origin{3} && Origin::kFound == Origin{8});
+Result<std::vector<UnitId>> StoreReader::CountedAnewSince(std::uint64_t change) {
   return Query<UnitId>(
-      *connection_, "intent",
-      "SELECT unit_id FROM intent WHERE end = 5 AND ended_ns > ?2 "
-      "UNION SELECT unit_id FROM axis_history JOIN unit USING (serial) "
-      "WHERE axis_history.origin IN (3, 8) AND axis_history.at_ns > ?2 "
-      "UNION SELECT unit_id FROM unit_history AS now WHERE at_ns > ?2 AND serial <> 0 AND "
-      "serial <> (SELECT before.serial FROM unit_history AS before WHERE "
-      "before.unit_id = now.unit_id AND before.entry < now.entry AND before.serial <> 0 "
-      "ORDER BY before.entry DESC LIMIT 1) "
+      *connection_, "counted_anew",
+      "SELECT unit_id FROM unit JOIN counted_anew USING (serial) WHERE model >= ?2 "
       "ORDER BY unit_id LIMIT ?1",
-      limits::kUnits, {since.ns},
+      limits::kUnits, {static_cast<std::int64_t>(change)},
       [](Cells& cells) { return UnitId{cells.Whole<std::uint32_t>(0)}; });
 }
 

@@ -59,9 +59,10 @@ class StoreReader {
   /// The newest exposure of a configuration; none: it was never measured.
   Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
   Result<std::vector<ModelHistory>> Models(std::uint32_t limit);
-  /// The units whose count began anew after `since`: homed, set by hand, found by the camera, or
-  /// other hardware was adopted there.
-  Result<std::vector<UnitId>> CountedAnewSince(WallTime since);
+  /// The units whose count began anew after this change of the model (ModelRow::entry), in the
+  /// order of the store's rows: homed, set by hand, found by the camera, or other hardware was
+  /// adopted there.
+  Result<std::vector<UnitId>> CountedAnewSince(std::uint64_t change);
   /// The places and the hardware that is bound to each.
   Result<std::vector<std::pair<UnitId, SerialNumber>>> Bindings();
   /// The text of a model. Errors: kRefused: the store has none of that sha256.

@@ -52,20 +52,30 @@ void AuditTrail::Commanded(std::uint64_t request, const Caller& caller, std::str
   Add(request, caller, verb, line, {.taken = true});
 }
 
-void AuditTrail::Refused(const Caller& caller, std::string_view verb, std::string_view line,
-                         const Error& why) {
+void AuditTrail::Refused(WallTime now, const Caller& caller, std::string_view verb,
+                         std::string_view line, const Error& why) {
+  Quota& quota = QuotaOf(NameOf(caller), now);
+  if (full_ || quota.kept >= kRepeatsKept) {
+    ++quota.left_out;
+    return;
+  }
   Add(0, caller, verb, line,
       {.code = CodeName(why.code), .reason = FrontOf(why.text, AuditRow::kReasonBytesMax)});
 }
 
-bool AuditTrail::Admit(WallTime now, Entry* entry) {
-  AuditRow& row = entry->row;
-  if (row.taken && row.verb != "stop") return true;
-  const bool known = quotas_.size() < kQuotas || quotas_.contains(row.name);
-  Quota& quota = quotas_[known ? row.name : std::string()];
+AuditTrail::Quota& AuditTrail::QuotaOf(const std::string& name, WallTime now) {
+  const bool known = quotas_.size() < kQuotas || quotas_.contains(name);
+  Quota& quota = quotas_[known ? name : std::string()];
   if (now.ns < quota.began_ns || now.ns - quota.began_ns >= kQuotaNs)
     quota = {.began_ns = now.ns, .left_out = quota.left_out};
-  if (quota.kept >= kRepeatsKept) {
+  return quota;
+}
+
+bool AuditTrail::Admit(const Turn& turn, Entry* entry) {
+  AuditRow& row = entry->row;
+  if (row.taken && row.verb != "stop") return true;
+  Quota& quota = QuotaOf(row.name, turn.now);
+  if (turn.full || quota.kept >= kRepeatsKept) {
     ++quota.left_out;
     return false;
   }
@@ -77,8 +87,9 @@ bool AuditTrail::Admit(WallTime now, Entry* entry) {
   return true;
 }
 
-void AuditTrail::Take(std::span<const ReplyEffect> replies, std::uint64_t configuration,
-                      WallTime now, std::vector<Row>* rows) {
+void AuditTrail::Take(std::span<const ReplyEffect> replies, const Turn& turn,
+                      std::vector<Row>* rows) {
+  full_ = turn.full;
   std::vector<Row> taken;
   for (Entry& entry : entries_) {
     const auto reply = std::ranges::find_if(replies, [&](const ReplyEffect& one) {
@@ -89,8 +100,8 @@ void AuditTrail::Take(std::span<const ReplyEffect> replies, std::uint64_t config
       entry.row.code = CodeName(reply->error->code);
       entry.row.reason = FrontOf(reply->error->text, AuditRow::kReasonBytesMax);
     }
-    if (MovesUnits(entry.row.verb) && entry.row.taken) entry.row.configuration = configuration;
-    if (Admit(now, &entry)) taken.push_back(std::move(entry.row));
+    if (MovesUnits(entry.row.verb) && entry.row.taken) entry.row.configuration = turn.configuration;
+    if (Admit(turn, &entry)) taken.push_back(std::move(entry.row));
   }
   entries_.clear();
   rows->insert(rows->begin(), std::make_move_iterator(taken.begin()),

@@ -117,7 +117,9 @@ std::size_t ModelRegistry::Origin(std::size_t index) const {
   return origin == changes_.end() ? index : static_cast<std::size_t>(origin - changes_.begin());
 }
 
-WallTime ModelRegistry::since() const { return changes_[Origin(changes_.size() - 1)].at; }
+std::uint64_t ModelRegistry::since() const {
+  return changes_[Origin(changes_.size() - 1)].row.entry;
+}
 
 Result<ModelRow> ModelRegistry::Rollback(
     const std::function<Result<std::string>(const std::string&)>& text_of) {

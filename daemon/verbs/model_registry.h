@@ -54,9 +54,9 @@ class ModelRegistry {
   Result<ModelRow> Rollback(const std::function<Result<std::string>(const std::string&)>& text_of);
 
   [[nodiscard]] const Layout& layout() const { return *layout_; }
-  /// The time at which the model in force was first put in force. Units homed later go without it.
-  /// Pre: a model is in force.
-  [[nodiscard]] WallTime since() const;
+  /// The change that first put the model in force. Units homed later go without it. Pre: a model is
+  /// in force.
+  [[nodiscard]] std::uint64_t since() const;
 
   /// The model in force; none: commands go as they are.
   [[nodiscard]] const Compensation* compensation() const {

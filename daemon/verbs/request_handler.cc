@@ -22,6 +22,9 @@ namespace focalfleet {
 namespace {
 
 constexpr double kWaitMaxS = 1e6;
+/// Those of all clients there can be. More are of clients that came, asked and went.
+constexpr std::size_t kWaitersMax = (limits::kControlClients + limits::kControlClientsReserved) *
+                                    std::size_t{limits::kControlRequestsOpen};
 
 /// The numbers of the units that the request chooses.
 Result<Json> AskSelection(const ControlRequest& request, const FleetView& view) {
@@ -125,7 +128,7 @@ void RequestHandler::NoteRefusal(const FleetView& view, const IncomingLine& line
       refusals_.Admit({view.now.ns}, asked.request.verb + " refused: " + why.text);
   if (!text.empty()) options_.log(text);
   if (options_.audit != nullptr)
-    options_.audit->Refused(asked.caller, asked.request.verb, line.text, why);
+    options_.audit->Refused(view.at, asked.caller, asked.request.verb, line.text, why);
 }
 
 void RequestHandler::Do(const FleetView& view, const IncomingLine& line, const Asked& asked,
@@ -164,6 +167,11 @@ void RequestHandler::Do(const FleetView& view, const IncomingLine& line, const A
                                 "a stop that came before " + request->verb +
                                     " was begun went ahead of it; command it again if it is still "
                                     "wanted"));
+  const Status room = request->verb == "stop" ? Status() : options_.room_for_rows();
+  if (!room) {
+    NoteRefusal(view, line, asked, room.error());
+    return Answer(pending, tl::unexpected<Error>(room.error()));
+  }
   const auto wait = FlagArgumentOr(request->args, "wait", false);
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
   pending.wait = *wait && pending.is_configuration;
@@ -173,7 +181,7 @@ void RequestHandler::Do(const FleetView& view, const IncomingLine& line, const A
   if (!command) {
     options_.log(request->verb + " refused: " + FirstRow(command.error().text));
     if (options_.audit != nullptr)
-      options_.audit->Refused(asked.caller, request->verb, line.text, command.error());
+      options_.audit->Refused(view.at, asked.caller, request->verb, line.text, command.error());
     return Answer(pending, tl::unexpected<Error>(command.error()));
   }
   options_.log(request->verb + " commanded by " + Describe(asked.caller));
@@ -231,7 +239,7 @@ std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view
         return reader->ModelText(sha256);
       });
     FOCALFLEET_TRY_ASSIGN(const std::string text,
-                          TextArgument(request.args, "model_toml", kControlLineBytesMax));
+                          TextArgument(request.args, "model_toml", limits::kModelLineBytes));
     FOCALFLEET_TRY_ASSIGN(const std::string source,
                           TextArgumentOr(request.args, "source", "model.toml"));
     return models.Load(text, source);
@@ -318,6 +326,10 @@ void RequestHandler::Wait(const FleetView& view, const ControlRequest& request, 
         view.now +
         DurationNs{static_cast<std::int64_t>(*timeout_s * static_cast<double>(options_.second.ns))};
   }
+  if (waiting_ >= kWaitersMax)
+    return Answer(pending, Fail(ErrorCode::kFull, std::to_string(waiting_) +
+                                                      " requests wait for the configuration; ask "
+                                                      "again in a second"));
   pending.wait = true;
   pending.awaits = view.coordinator->configuration().id;
   pending_.emplace(next_request_++, pending);
@@ -326,6 +338,7 @@ void RequestHandler::Wait(const FleetView& view, const ControlRequest& request, 
 
 void RequestHandler::AnswerWaiters(const FleetView& view) {
   const ConfigurationView& configuration = view.coordinator->configuration();
+  std::optional<Json> summary;
   for (auto it = pending_.begin(); it != pending_.end();) {
     const Pending& pending = it->second;
     const bool over = !view.coordinator->busy() || configuration.id != pending.awaits;
@@ -333,8 +346,9 @@ void RequestHandler::AnswerWaiters(const FleetView& view) {
       ++it;
       continue;
     }
+    if (over && !summary) summary = ConfigurationJson(view);
     if (over)
-      Answer(pending, ConfigurationJson(view));
+      Answer(pending, *summary);
     else
       Answer(pending, Fail(ErrorCode::kRefused, "configuration " + std::to_string(pending.awaits) +
                                                     " is still under way"));
@@ -388,10 +402,13 @@ void RequestHandler::ShowProgress(const FleetView& view) {
     server_->Progress(dry_run_->pending.client, EncodeProgress(dry_run_->pending.id, planning));
   }
   if (waiting_ == 0) return;
-  const Json progress = ProgressJson(view);
-  for (const auto& [request, pending] : pending_)
-    if (GetsProgress(pending))
-      server_->Progress(pending.client, EncodeProgress(pending.id, progress));
+  const std::string progress = EncodeText(ProgressJson(view));
+  waiting_ -= std::erase_if(pending_, [&](const auto& entry) {
+    const Pending& pending = entry.second;
+    const bool is_there = !GetsProgress(pending) ||
+                          server_->Progress(pending.client, ProgressLine(pending.id, progress));
+    return !is_there && pending.awaits != 0;  // its client is gone, and the wait was all it asked
+  });
 }
 
 void RequestHandler::Close() {

@@ -13,6 +13,9 @@
 // Requests of other verbs share a budget a turn (kTurnBytes); after it, the loop serves buses,
 // signals and the next stop first. Motions that a stop overtook are refused, because the stop was
 // meant for them, too.
+//
+// Where too many rows wait for a disk that is full, commands that write rows are refused before
+// anything changes. A stop is always taken.
 #pragma once
 
 #include <cstdint>
@@ -52,7 +55,9 @@ class RequestHandler {
     ModelRegistry* models = nullptr;  // outlives the handler
     AlarmRegister* alarms = nullptr;  // likewise
     AuditTrail* audit = nullptr;      // likewise; none: nothing is kept
-    std::uint32_t own_pid = 0;        // clients of this process may ask on behalf of others
+    /// A command may add rows to those that wait for the store. Errors: why it may not.
+    std::function<Status()> room_for_rows = [] { return Status(); };
+    std::uint32_t own_pid = 0;  // clients of this process may ask on behalf of others
   };
   RequestHandler(std::unique_ptr<LineExchange> server, Options options)
       : server_(std::move(server)), options_(std::move(options)) {}

@@ -53,7 +53,7 @@ std::vector<std::optional<Pose>> OffsetsOf(const FleetView& view,
 Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   FOCALFLEET_TRY_ASSIGN(const std::string source, TextArgumentOr(args, "source", "targets"));
   FOCALFLEET_TRY_ASSIGN(const std::string csv,
-                        TextArgument(args, "targets_csv", kControlLineBytesMax));
+                        TextArgument(args, "targets_csv", limits::kControlLineBytes));
   FOCALFLEET_TRY(CheckLines(csv, source, std::size_t{2} * limits::kUnits));
   FOCALFLEET_TRY_ASSIGN(const bool fixed, FlagArgumentOr(args, "fixed", false));
   // This check comes first: the operator needs this answer whatever the file holds.

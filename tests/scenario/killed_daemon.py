@@ -2,9 +2,10 @@
 """killed_daemon.py BIN [--kills N] [--seed S] [--units U] [--speed X]: kills the real daemon (kill -9) at random instants under load. A fleet
 of U units moves, a camera measures, DDS publishes, and the store is on a small file system of its own. In half of the kills units lose their
 power shortly before or after, in a third of them the disk is full when the daemon dies. After each restart the store is compared with the
-true shafts: nothing that was acknowledged is lost, nothing that is stored is false, no move began twice. The last lines have the time from
-the start of the process to its first answer, and to the moment at which all units have been read. The exit code is 1 where something was
-lost or false, and 77 where this machine lets nobody make a file system of one's own."""
+true shafts: nothing that was acknowledged is lost, nothing that is stored is false, no move began twice. No place is lost but that of a unit
+which lost its power, and the daemon starts at the first attempt, within START_S. The last lines have the time from the start of the process
+to its first answer, and to the moment at which all units have been read. The exit code is 1 where something was lost, false or late, and 77
+where this machine lets nobody make a file system of one's own."""
 
 import argparse
 import csv
@@ -21,6 +22,8 @@ import time
 from paused_host import Lines
 
 PATIENCE_S = 300
+# A restart takes a second or two with 5000 units on two busy cores, until all of them have been read. Twenty times that is no slow machine.
+START_S = 40
 UNITS_PER_BUS = 100
 STORE_BYTES = 192 << 20
 LAG_VECTORS = 6  # of a rotor at rest behind its field, with rounding
@@ -120,12 +123,13 @@ class Fleet:
     def phases(self):
         return self.ask("control.sock", "status")["phases"]
 
-    def start_daemon(self, without_power=0):
+    def start_daemon(self, wrong, without_power=0):
         begun = time.monotonic()
         self.daemon = self.start("focalfleetd", "--config", "focalfleet.toml")
 
         def answers():
-            if self.daemon.poll() is not None:  # as the service manager does
+            if self.daemon.poll() is not None:  # again, as the service manager does, to see what follows
+                wrong.append(f"the daemon ended at its start with {self.daemon.returncode}")
                 self.daemon = self.start("focalfleetd", "--config", "focalfleet.toml")
                 time.sleep(0.2)
             return self.connects("control.sock")
@@ -140,6 +144,8 @@ class Fleet:
 
         self.await_("units to be read", are_read)
         self.read_s.append(time.monotonic() - begun)
+        if self.read_s[-1] > START_S:
+            wrong.append(f"all units were read {self.read_s[-1]:.1f} s after the start, and {START_S} s are enough")
 
     def truth(self):
         text = self.ask("sim.sock", "truth")["csv"]
@@ -184,12 +190,12 @@ class Disk:
 
 def check(fleet, disabled, wrong):
     truth = fleet.truth()
-    for unit, axis, witness, low, high in fleet.rows(
-        "SELECT unit_id, axis, witness, low, high FROM axis_state JOIN unit USING (serial)"
+    for unit, axis, witness, low, high, offset in fleet.rows(
+        "SELECT unit_id, axis, witness, low, high, offset FROM axis_state JOIN unit USING (serial)"
     ):
         row = truth[unit]
         at = float(row["phi_true_vectors" if axis else "theta_true_vectors"])
-        slack = SEEN_VECTORS if witness == MEASURED else LAG_VECTORS
+        slack = SEEN_VECTORS if witness == MEASURED or offset else LAG_VECTORS  # an offset is what the camera saw before
         if witness >= KNOWN and not low - slack <= at <= high + slack:
             wrong.append(f"unit {unit} axis {axis} is at {at:.1f}, stored is {low}..{high} (witness {witness})")
     for unit, row in truth.items():
@@ -236,17 +242,19 @@ def kill_once(fleet, number, disk):
         cut()
     time.sleep(chance.uniform(0, 1.5))
     disk.free()
-    fleet.start_daemon(len(victims))
+    fleet.start_daemon(wrong, len(victims))
     fleet.await_("all to settle", fleet.is_settled)
     check(fleet, disabled, wrong)
     if disabled:
         fleet.ask("control.sock", "enable", unit_ids=[disabled[0]])
-    lost = fleet.rows("SELECT count(DISTINCT unit_id) FROM axis_state JOIN unit USING (serial) WHERE witness < 3")[0][0]
+    lost = {row[0] for row in fleet.rows("SELECT DISTINCT unit_id FROM axis_state JOIN unit USING (serial) WHERE witness < 3")}
+    if not_explained := sorted(lost.difference(victims)):
+        wrong.append(f"{len(not_explained)} units had their power all the time and lost their place: {not_explained[:20]}")
     if lost:
         fleet.ask("control.sock", "home", not_known=True, unproven=True, wait=True)
         fleet.await_("all to settle", fleet.is_settled)
         check(fleet, None, wrong)
-    print(f"kill {number}: after {span_s:.1f} s, {len(victims)} units without power, disk {'full' if full else 'well'}, {lost} units lost, "
+    print(f"kill {number}: after {span_s:.1f} s, {len(victims)} units without power, disk {'full' if full else 'well'}, {len(lost)} units lost, "
           f"answers after {fleet.answers_s[-1]:.2f} s, read after {fleet.read_s[-1]:.2f} s, {len(wrong)} wrong", flush=True)
     return wrong
 
@@ -273,7 +281,7 @@ def main():
         wrong = []
         try:
             fleet.begin()
-            fleet.start_daemon()
+            fleet.start_daemon(wrong)
             fleet.await_("all to settle", fleet.is_settled)
             for number in range(options.kills):
                 wrong += [f"kill {number}: {what}" for what in kill_once(fleet, number, disk)]

@@ -19,8 +19,10 @@ from focalfleet.errors import FocalfleetError, InvalidInput, Refused, Stopped, U
 
 DEFAULT_SOCKET = "/run/focalfleet/control.sock"
 
-# The daemon reads no longer request (kControlLineBytesMax in daemon/control/messages.h).
-REQUEST_BYTES_MAX = 16 << 20
+# The daemon reads no longer request, except for models (limits.h: kControlLineBytes and
+# kModelLineBytes).
+REQUEST_BYTES_MAX = 2 << 20
+MODEL_BYTES_MAX = 16 << 20
 # The state of 32,768 units, the most of a fleet, has some 20 MB. Ten times that is no answer.
 ANSWER_BYTES_MAX = 256 << 20
 CHUNK_BYTES = 1 << 20
@@ -175,10 +177,10 @@ def _encoded(number: int, verb: str, args: dict[str, Any]) -> bytes:
         line = text.encode() + b"\n"
     except (TypeError, ValueError) as error:
         raise InvalidInput(f"{verb}: an argument cannot be sent: {error}") from error
-    if len(line) > REQUEST_BYTES_MAX:
+    most = MODEL_BYTES_MAX if verb == "model_load" else REQUEST_BYTES_MAX
+    if len(line) > most:
         raise InvalidInput(
-            f"{verb}: the request has {len(line)} bytes; the daemon takes at most "
-            f"{REQUEST_BYTES_MAX}"
+            f"{verb}: the request has {len(line)} bytes; the daemon takes at most {most}"
         )
     return line
 

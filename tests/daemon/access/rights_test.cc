@@ -7,6 +7,8 @@
 #include <set>
 #include <string>
 
+#include "protocol/base/limits.h"
+
 namespace focalfleet {
 namespace {
 
@@ -35,6 +37,12 @@ TEST(Rights, AViewerChangesNothingButAStop) {
     EXPECT_EQ(right.changes && CheckRight(Of(Role::kViewer), right.verb, {}),
               std::string(right.verb) == "stop")
         << right.verb;
+}
+
+TEST(Rights, ALineIsAsLongAsItsCallersLongestRequest) {
+  EXPECT_EQ(LineBytesMaxOf(Role::kViewer), limits::kViewerLineBytes);
+  EXPECT_EQ(LineBytesMaxOf(Role::kOperator), limits::kControlLineBytes);
+  EXPECT_EQ(LineBytesMaxOf(Role::kEngineer), limits::kModelLineBytes);
 }
 
 TEST(Rights, AFlagMayTakeMoreThanItsVerb) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 
@@ -98,7 +99,11 @@ TEST(LineServer, AnUrgentLineOvertakesLinesOfItsClientWhichAreMarked) {
   ASSERT_EQ(urgent.size(), 1u);
   EXPECT_FALSE(urgent[0].overtaken);
   std::map<std::string, bool> overtaken;
-  for (const IncomingLine& line : Drain(&server)) overtaken[line.text] = line.overtaken;
+  for (auto lines = Drain(&server); !lines.empty(); lines = Drain(&server))
+    for (const IncomingLine& line : lines) {
+      overtaken[line.text] = line.overtaken;
+      server.Answer(line.client, "");
+    }
   EXPECT_EQ(overtaken.size(), 1003u);
   EXPECT_TRUE(overtaken["apply x"]);
   EXPECT_TRUE(overtaken["state 999"]);
@@ -159,6 +164,65 @@ TEST(LineServer, RefusesALineThatIsTooLongAndCloses) {
   bool ended = false;
   EXPECT_THAT(client.Receive(&ended), HasSubstr("more than 1000 bytes"));
   EXPECT_TRUE(ended);
+  EXPECT_EQ(server.clients(), 0u);
+}
+
+TEST(LineServer, TheLengthOfALineGoesByTheRoleOfItsClient) {
+  const test::ScratchFolder scratch;
+  Role role = Role::kViewer;
+  auto server = LineServer::Create(
+                    scratch / "s",
+                    {.line_bytes_max_of = [](Role of) { return of == Role::kViewer ? 10u : 1000u; },
+                     .role_of = [&role](const auto&) { return role; }})
+                    .value();
+  const RawClient viewer(scratch / "s");
+  OnlyUrgent(&server);
+  role = Role::kEngineer;
+  const RawClient engineer(scratch / "s");
+  viewer.Send(std::string(11, 'x') + "\n");
+  engineer.Send(std::string(11, 'x') + "\n");
+  EXPECT_EQ(Drain(&server).size(), 1u);
+  EXPECT_THAT(viewer.Receive(), HasSubstr("more than 10 bytes"));
+  EXPECT_EQ(engineer.Receive(), "");
+}
+
+TEST(LineServer, AClientHasSoManyRequestsOpenAndNoMore) {
+  const ScratchFolder scratch;
+  auto server = LineServer::Create(scratch / "s", {.urgent = &IsStop}).value();
+  const RawClient greedy(scratch / "s");
+  const RawClient modest(scratch / "s");
+  std::string many;
+  for (int n = 0; n < 100; ++n) many += std::to_string(n) + "\n";
+  greedy.Send(many);
+  modest.Send("a\n");
+  const auto lines = Drain(&server);
+  ASSERT_EQ(lines.size(), limits::kControlRequestsOpen + 1) << "and that of the other client";
+  EXPECT_FALSE(Readable(server.fd())) << "nothing is to be done until one is answered";
+  const auto of_greedy =
+      std::ranges::find_if(lines, [](const IncomingLine& line) { return line.text == "7"; });
+  ASSERT_NE(of_greedy, lines.end());
+  EXPECT_TRUE(server.Progress(of_greedy->client, "goes on"));
+  EXPECT_TRUE(Drain(&server).empty()) << "progress is no answer";
+  EXPECT_TRUE(server.Answer(of_greedy->client, "done"));
+  const auto next = Drain(&server);
+  ASSERT_EQ(next.size(), 1u);
+  EXPECT_EQ(next[0].text, "8");
+  greedy.Send("stop\n");
+  const auto stop = Drain(&server);
+  ASSERT_EQ(stop.size(), 1u) << "a stop waits for no answer";
+  EXPECT_EQ(stop[0].text, "stop");
+}
+
+TEST(LineServer, AClientThatClosedKeepsNoPlaceForItsOpenRequests) {
+  const ScratchFolder scratch;
+  auto server = LineServer::Create(scratch / "s", {.urgent = &IsStop}).value();
+  RawClient client(scratch / "s");
+  std::string many;
+  for (int n = 0; n < 100; ++n) many += std::to_string(n) + "\n";
+  client.Send(many);
+  EXPECT_EQ(Drain(&server).size(), limits::kControlRequestsOpen);
+  client.Close();
+  EXPECT_EQ(Drain(&server).size(), 100 - limits::kControlRequestsOpen) << "they still count";
   EXPECT_EQ(server.clients(), 0u);
 }
 

@@ -64,12 +64,34 @@ TEST(ControlMessages, DepthIsBoundedBeforeAnythingIsParsed) {
   };
   EXPECT_TRUE(DecodeRequest(nested(limits::kControlDepth - 2)));
   for (const std::string& line :
-       {nested(limits::kControlDepth - 1), nested(1'000'000), std::string(16'000'000, '[')}) {
+       {nested(limits::kControlDepth - 1), nested(1'000'000), std::string(2'000'000, '[')}) {
     const auto request = DecodeRequest(line);
     ASSERT_FALSE(request);
     EXPECT_THAT(request.error().text, HasSubstr("more than 16 deep"));
     EXPECT_FALSE(DecodeAnswer(line));
   }
+}
+
+TEST(ControlMessages, OnlyAModelMayBeLongerThanOtherLines) {
+  const std::string text(limits::kControlLineBytes, 't');
+  const auto load = DecodeRequest(EncodeRequest({1, "model_load", {{"model_toml", text}}}));
+  ASSERT_TRUE(load) << load.error().text;
+  EXPECT_TRUE(
+      DecodeRequest(R"({"id":1,"verb":"model_load","args":{"model_toml":")" + text + R"("}})"));
+  const auto apply = DecodeRequest(EncodeRequest({1, "apply", {{"targets_csv", text}}}));
+  ASSERT_FALSE(apply);
+  EXPECT_THAT(apply.error().text, HasSubstr("more than 2097152 bytes"));
+  EXPECT_TRUE(DecodeRequest(EncodeRequest({1, "apply", {{"targets_csv", text.substr(100)}}})));
+}
+
+TEST(ControlMessages, AProgressForManyIsThatForOne) {
+  const Json progress{{"state", "moving"}, {"share", 0.5}};
+  EXPECT_EQ(ProgressLine(7, EncodeText(progress)),
+            R"({"id":7,"progress":)" + progress.dump() + "}");
+  EXPECT_EQ(EncodeProgress(7, progress), ProgressLine(7, EncodeText(progress)));
+  const auto answer = DecodeAnswer(EncodeProgress(7, progress));
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->body, progress);
 }
 
 TEST(ControlMessages, BracketsAndEscapedQuotesInTextsAreNoDepth) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "protocol/base/limits.h"
 #include "protocol/wire/codec.h"
 
 namespace focalfleet {
@@ -13,7 +14,10 @@ struct FakePort : PollablePort {
     sent += taken;
     return taken;
   }
-  void Receive(HostInstant, std::vector<ReceivedFrame>*) override { ++received; }
+  void Receive(HostInstant, std::vector<ReceivedFrame>* out) override {
+    ++received;
+    out->resize(out->size() + gives);
+  }
   [[nodiscard]] LinkState state() const override { return link; }
   [[nodiscard]] int fd() const override { return -1; }
   [[nodiscard]] HostInstant wake_at() const override { return wake; }
@@ -25,6 +29,7 @@ struct FakePort : PollablePort {
   std::size_t room = 1000;
   std::size_t sent = 0;
   int received = 0;
+  std::size_t gives = 0;  // frames in each Receive
   LinkState link = LinkState::kUp;
   HostInstant wake = kNever;
   PortCounters none;
@@ -99,6 +104,27 @@ TEST_F(BusLinesTest, ReceivesOnlyWhereSomethingIsReadyOrDue) {
   EXPECT_EQ(fakes_[1]->received, 2);
   Receive(100);
   EXPECT_EQ(fakes_[0]->received, 2);
+}
+
+TEST_F(BusLinesTest, ATurnTakesSoManyFramesAndBusesTakeTurns) {
+  Receive(1);
+  for (FakePort* fake : fakes_) fake->gives = limits::kFramesPerStep;
+  const auto ready = [&] {
+    frames_.clear();
+    for (std::size_t line = 0; line < fakes_.size(); ++line) lines_->MarkReady(line);
+    Receive(2);
+  };
+  for (int turn = 1; turn <= 6; ++turn) {
+    ready();
+    EXPECT_EQ(frames_.size(), limits::kFramesPerStep) << "a command is looked at in between";
+    EXPECT_EQ(fakes_[0]->received, 1 + (turn + 1) / 2) << "turn " << turn;
+    EXPECT_EQ(fakes_[1]->received, 1 + turn / 2) << "turn " << turn;
+    EXPECT_EQ(lines_->wake_at(HostInstant{2}, clock_), HostInstant{2}) << "the rest is due at once";
+  }
+  frames_.clear();
+  Receive(3);
+  EXPECT_EQ(fakes_[0]->received, 5) << "what was left stays ready";
+  EXPECT_EQ(lines_->wake_at(HostInstant{3}, clock_), kNever);
 }
 
 TEST_F(BusLinesTest, ADeadLinkDiscardsWaitingFramesAndTakesNone) {

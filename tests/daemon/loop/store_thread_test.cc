@@ -6,6 +6,8 @@
 
 #include <mutex>
 
+#include "protocol/base/limits.h"
+
 namespace focalfleet {
 namespace {
 
@@ -224,6 +226,34 @@ TEST(StoreThread, MoreBatchesThanTheQueueHoldsAreAllWritten) {
     return thread->committed_through() == kMany;
   }));
   ASSERT_TRUE(thread->Finish());
+}
+
+TEST(StoreThread, RowsThatWaitForAFullDiskAreBoundedAndNoneIsLost) {
+  Disk disk;
+  disk.Break(true);
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  thread->Commit(1, Named("x"));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->failing(); }));
+  const std::string text(std::size_t{1} << 20, 'r');
+  constexpr std::uint64_t kMost = limits::kRowBytesWaiting >> 20;
+  std::uint64_t batch = 1;
+  while (thread->RoomForRows() && batch < 2 * kMost) thread->Commit(++batch, Named(text));
+  EXPECT_EQ(batch - 1, kMost) << "a few bytes of each row come on top";
+  const Status room = thread->RoomForRows();
+  ASSERT_FALSE(room);
+  EXPECT_EQ(room.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(room.error().text, HasSubstr("64 MiB of rows wait for the store already"));
+  EXPECT_THAT(room.error().text, HasSubstr("no space"));
+  thread->Commit(++batch, Named("stop"));  // it is kept all the same
+  disk.Break(false);
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == batch; }));
+  EXPECT_TRUE(thread->RoomForRows());
+  EXPECT_EQ(thread->writer().bytes_waiting(), 0u);
+  ASSERT_TRUE(thread->Finish());
+  std::size_t bytes = 0;
+  for (const std::string& line : disk.log()) bytes += line.starts_with("commit") ? line.size() : 0;
+  EXPECT_GE(bytes, kMost << 20);
 }
 
 TEST(StoreThread, RefusesStatusWhenItIsBehind) {

@@ -124,6 +124,29 @@ TEST_F(StoreTest, AlarmsOfVersionEightHaveNoNameAndNoneIsOpen) {
   EXPECT_STREQ(Name(alarms->front().row.name), "unnamed");
 }
 
+TEST_F(StoreTest, AStoreOfVersionElevenKnowsWhoseCountBeganAnewSinceEachModel) {
+  {
+    auto connection = Open(Path());
+    ASSERT_TRUE(Migrate(*connection, 0, Migrations().first(11)));
+    ASSERT_TRUE(connection->Execute(
+        "INSERT INTO unit(unit_id, serial, enabled, reason, at_ns) VALUES(1, 11, 1, '', 1), "
+        "(2, 12, 1, '', 1), (3, 13, 1, '', 1), (4, 24, 1, '', 60), (5, 15, 1, '', 1); "
+        "INSERT INTO unit_history VALUES(1, 4, 14, 1, '', 1), (2, 4, 24, 1, '', 60); "
+        "INSERT INTO model_change(entry, name, campaign, campaign_sha256, at_ns) "
+        "VALUES(1, '', '', '', 20), (2, '', '', '', 50); "
+        "INSERT INTO axis_history VALUES(1, 13, 0, 3, 1, 1, 96, 3, 60), "
+        "(2, 15, 0, 3, 1, 1, 96, 5, 60); "
+        "INSERT INTO intent(configuration, unit_id, serial, move, theta_from, phi_from, theta_to, "
+        "phi_to, theta_low, theta_high, phi_low, phi_high, began_ns, ended_ns, end) VALUES"
+        "(1, 1, 11, 1, 0, 0, 0, 0, 0, 0, 0, 0, 9, 10, 5), "
+        "(1, 2, 12, 1, 0, 0, 0, 0, 0, 0, 0, 0, 29, 30, 5)"));
+  }
+  OpenStore();
+  const auto units = [&](std::uint64_t change) { return OpenReader()->CountedAnewSince(change); };
+  EXPECT_EQ(units(1), (std::vector<UnitId>{{2}, {3}, {4}}));
+  EXPECT_EQ(units(2), (std::vector<UnitId>{{3}, {4}}));
+}
+
 TEST_F(StoreTest, OpeningANewStoreSurvivesEveryFailingWrite) {
   focalfleet::test::FaultyDisk disk;
   std::uint64_t n = 1;

@@ -138,7 +138,7 @@ TEST_F(StoreTest, PruneKeepsWhatSaysForWhichUnitsAModelHolds) {
   test::ExpectDone(store->Commit(
       std::vector<Row>{Vector(7, Witness::kReported, 1, 1, 3, Origin::kOperator)}, kEight));
   EXPECT_EQ(PruneAll(*store, kNine), 1u) << "the first homing";
-  EXPECT_EQ(OpenReader()->CountedAnewSince({2}), std::vector<UnitId>{{12}});
+  EXPECT_EQ(OpenReader()->CountedAnewSince(1), std::vector<UnitId>{{12}});
   EXPECT_EQ(PruneAll(*store, kNine), 0u);
 }
 
@@ -154,7 +154,7 @@ TEST_F(StoreTest, PruneKeepsTheUnitThatAPlaceHadBeforeTheFirstModel) {
   EXPECT_EQ(PruneAll(*store, kEight), 0u);
   test::ExpectDone(
       store->Commit(std::vector<Row>{BindingRow{{12}, {8}}, EnableRow{{13}, false, "bent"}}, {5}));
-  EXPECT_EQ(OpenReader()->CountedAnewSince({4}), std::vector<UnitId>{{12}}) << "adopted since";
+  EXPECT_EQ(OpenReader()->CountedAnewSince(1), std::vector<UnitId>{{12}}) << "adopted since";
 }
 
 TEST_F(StoreTest, PruneKeepsNumbersOfChangesOfUnitsAscending) {

@@ -67,37 +67,61 @@ TEST_F(StoreTest, ModelsAndWhenTheyHeldComeBack) {
   EXPECT_EQ(OpenReader()->Models(10)->size(), 3u);
 }
 
-TEST_F(StoreTest, ListsUnitsWhoseCountBeganAnewSince) {
+TEST_F(StoreTest, ListsUnitsWhoseCountBeganAnewSinceAChangeOfTheModel) {
   auto store = OpenStore();
-  const auto home = [&](std::uint32_t unit, std::uint32_t serial, IntentEnd end, WallTime at) {
-    test::ExpectDone(store->Commit(
-        std::vector<Row>{Intent(unit, serial, 3, {0, 0}, {5, 5}), IntentEndRow{{serial}, {3}, end}},
-        at));
+  // Time goes backwards: the order of the rows decides.
+  auto commit = [&, now = kNine](std::vector<Row> rows) mutable {
+    now.ns -= 60'000'000'000;
+    test::ExpectDone(store->Commit(rows, now));
   };
-  home(12, 7001, IntentEnd::kHomed, kEight);
-  home(13, 7002, IntentEnd::kHomed, kNine);
-  home(14, 7003, IntentEnd::kArrived, kNine);
+  const auto home = [&](std::uint32_t unit, std::uint32_t serial, IntentEnd end) {
+    commit({Intent(unit, serial, 3, {0, 0}, {5, 5}), IntentEndRow{{serial}, {3}, end}});
+  };
+  commit({BindingRow{{12}, {7001}}, BindingRow{{13}, {7002}}, BindingRow{{14}, {7003}},
+          BindingRow{{15}, {7004}}, BindingRow{{16}, {7005}}, BindingRow{{17}, {7006}},
+          BindingRow{{19}, {7008}}, BindingRow{{20}, {7009}}, BindingRow{{21}, {7010}},
+          BindingRow{{22}, {7011}}});
+  home(21, 7010, IntentEnd::kHomed);
+  commit({ModelRow{.entry = 1}});
+  home(12, 7001, IntentEnd::kHomed);
+  commit({Intent(22, 7011, 3, {0, 0}, {5, 5})});
+  commit({ModelRow{.entry = 2}});
+  commit({IntentEndRow{{7011}, {3}, IntentEnd::kHomed}});  // it began before the model
+  home(13, 7002, IntentEnd::kHomed);
+  home(14, 7003, IntentEnd::kArrived);
   // Set by hand, found by the camera, corrected by it (no new count), bound first, replaced.
   const auto stands = [](std::uint32_t serial, Origin origin) {
     return test::Vector(serial, Witness::kReported, 5, 5, 1, origin);
   };
+  commit({stands(7004, Origin::kOperator), stands(7005, Origin::kFound),
+          stands(7006, Origin::kCamera), BindingRow{{18}, {7007}}, BindingRow{{19}, {7999}},
+          BindingRow{{20}, {0}}, BindingRow{{20}, {7009}}});
+  const auto since = [&](std::uint64_t change) {
+    const auto found = OpenReader()->CountedAnewSince(change);
+    EXPECT_TRUE(found) << found.error().text;
+    std::vector<std::uint32_t> units;
+    for (const UnitId unit : *found) units.push_back(unit.value);
+    return units;
+  };
+  EXPECT_EQ(since(2), (std::vector<std::uint32_t>{13, 15, 16, 19, 22}));
+  EXPECT_EQ(since(1), (std::vector<std::uint32_t>{12, 13, 15, 16, 19, 22}));
+  EXPECT_EQ(OpenReader()->Bindings()->size(), 11u);
+}
+
+TEST_F(StoreTest, WithinABatchAHomingCountsWhereItEnds) {
+  auto store = OpenStore();
+  const auto begin = [&](std::uint32_t unit, std::uint32_t serial) {
+    test::ExpectDone(store->Commit(
+        std::vector<Row>{BindingRow{{unit}, {serial}}, Intent(unit, serial, 3, {0, 0}, {5, 5})},
+        kEight));
+  };
+  begin(12, 7001);
+  begin(13, 7002);
   test::ExpectDone(store->Commit(
-      std::vector<Row>{BindingRow{{15}, {7004}}, BindingRow{{16}, {7005}}, BindingRow{{17}, {7006}},
-                       BindingRow{{19}, {7008}}, BindingRow{{20}, {7009}}},
-      kEight));
-  test::ExpectDone(store->Commit(
-      std::vector<Row>{stands(7004, Origin::kOperator), stands(7005, Origin::kFound),
-                       stands(7006, Origin::kCamera), BindingRow{{18}, {7007}},
-                       BindingRow{{19}, {7999}}, BindingRow{{20}, {0}}, BindingRow{{20}, {7009}}},
+      std::vector<Row>{IntentEndRow{{7001}, {3}, IntentEnd::kHomed}, ModelRow{.entry = 1},
+                       IntentEndRow{{7002}, {3}, IntentEnd::kHomed}},
       kNine));
-  const auto since = OpenReader()->CountedAnewSince(kEight);
-  ASSERT_TRUE(since) << since.error().text;
-  std::vector<std::uint32_t> units;
-  for (const UnitId unit : *since) units.push_back(unit.value);
-  EXPECT_EQ(units, (std::vector<std::uint32_t>{13, 15, 16, 19}));
-  const auto bound = OpenReader()->Bindings();
-  ASSERT_TRUE(bound) << bound.error().text;
-  EXPECT_EQ(bound->size(), 6u);
+  EXPECT_EQ(OpenReader()->CountedAnewSince(1), std::vector<UnitId>{{13}});
 }
 
 TEST_F(StoreTest, ATuningIsKeptWithMarginAndOriginAndTheOneBeforeItToo) {

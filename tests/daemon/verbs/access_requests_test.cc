@@ -68,7 +68,7 @@ class AccessRequests : public ::testing::Test {
   }
   std::vector<AuditRow> Audit(std::vector<ReplyEffect> replies = {}, WallTime now = kNow) {
     std::vector<Row> rows;
-    audit_.Take(replies, 12, now, &rows);
+    audit_.Take(replies, {.configuration = 12, .now = now}, &rows);
     std::vector<AuditRow> entries;
     for (const Row& row : rows) entries.push_back(std::get<AuditRow>(row));
     return entries;
@@ -157,6 +157,30 @@ TEST_F(AccessRequests, NoCallerFillsTheDisk) {
   ASSERT_THAT(later, SizeIs(1));
   EXPECT_THAT(later[0].reason, HasSubstr("240 entries before it were left out"));
   EXPECT_LT(std::count(log_.begin(), log_.end(), '\n'), 20);
+}
+
+TEST_F(AccessRequests, ARefusalThatIsNotKeptCostsNoHash) {
+  static_cast<void>(Ask(Role::kViewer, Line("adopt")));
+  static_cast<void>(Audit({}, WallTime{}));
+  std::string flood;
+  for (std::uint32_t n = 1; n < AuditTrail::kRepeatsKept; ++n) flood += Line("adopt");
+  static_cast<void>(Ask(Role::kViewer, flood));
+  EXPECT_THAT(Audit({}, WallTime{}), SizeIs(AuditTrail::kRepeatsKept - 1));
+  static_cast<void>(Ask(Role::kViewer, Line("adopt")));
+  EXPECT_FALSE(audit_.waiting()) << "it is counted, and no entry was made";
+}
+
+TEST_F(AccessRequests, WhereTheDiskIsFullRefusalsAndStopsAreCountedAlone) {
+  static_cast<void>(Ask(Role::kViewer, Line("adopt") + Line("stop")));
+  std::vector<Row> rows;
+  audit_.Take({}, {.now = {}, .full = true}, &rows);
+  static_cast<void>(Ask(Role::kViewer, Line("adopt")));
+  EXPECT_FALSE(audit_.waiting());
+  EXPECT_THAT(rows, IsEmpty());
+  static_cast<void>(Ask(Role::kViewer, Line("stop")));
+  const auto kept = Audit({}, WallTime{});
+  ASSERT_THAT(kept, SizeIs(1));
+  EXPECT_THAT(kept[0].reason, HasSubstr("3 entries before it were left out"));
 }
 
 TEST_F(AccessRequests, LongRequestsAreKeptByTheirFrontAndTheirHash) {

@@ -109,9 +109,10 @@ TEST_F(ModelRegistryTest, ARestartRestoresTheModelInForce) {
   after.TakeChanges(newest_first);
   ASSERT_TRUE(after.Restore(Text("two")));
   EXPECT_EQ(after.name(), "two");
-  EXPECT_EQ(after.since().ns, 5);
+  EXPECT_EQ(after.since(), 2u);
   ASSERT_TRUE(Rollback(&after));
   EXPECT_EQ(after.name(), "one");
+  EXPECT_EQ(after.since(), 1u) << "the change that put it in force first";
   // The model does not belong to this layout: none is in force, and the past is known.
   const auto other = Layout::Create(MakeHexLayout({.count = 3, .pitch_mm = 60}), {});
   ASSERT_TRUE(other);

@@ -56,6 +56,25 @@ TEST_F(ModelUpkeepTest, TheLastModelIsRestoredForUnitsWhoseCountDidNotBeginAnew)
   EXPECT_TRUE(models_.compensation()->Knows({2}));
 }
 
+TEST_F(ModelUpkeepTest, AClockThatStepsBackLeavesNoModelForAUnitThatWasHomedSince) {
+  constexpr WallTime kTwelve{12 * 3'600'000'000'000};
+  constexpr WallTime kFivePastEleven{11 * 3'600'000'000'000 + 300'000'000'000};
+  ASSERT_TRUE(store_->Commit(
+      std::vector<Row>{BindingRow{{1}, {7001}}, BindingRow{{2}, {7002}}, BindingRow{{3}, {7003}}},
+      {4}));
+  StoreModel(kTwelve);
+  IntentRow way{.configuration = 1, .serial = {7001}, .unit = {1}, .move = {3}};
+  for (AxisKnowledge& axis : way.hull) axis = {Witness::kInterval, 0, 0};
+  ASSERT_TRUE(store_->Commit(
+      std::vector<Row>{way, IntentEndRow{{7001}, {3}, IntentEnd::kHomed}, BindingRow{{3}, {7999}}},
+      kFivePastEleven));
+  const Status restored = RestoreModel(Reader().get(), &models_);
+  ASSERT_TRUE(restored) << restored.error().text;
+  EXPECT_FALSE(models_.compensation()->Knows({0})) << "it was homed after the model came";
+  EXPECT_TRUE(models_.compensation()->Knows({1}));
+  EXPECT_FALSE(models_.compensation()->Knows({2})) << "other hardware was adopted";
+}
+
 TEST_F(ModelUpkeepTest, AModelOfAnotherFleetIsNotRestored) {
   StoreModel({5});
   const auto other = Layout::Create(MakeHexLayout({.count = 3, .pitch_mm = 60}), {});

@@ -16,6 +16,7 @@
 #include "daemon/status/status_json.h"
 #include "protocol/base/limits.h"
 #include "tests/daemon/control/raw_client.h"
+#include "tests/daemon/verbs/model_text.h"
 #include "tests/daemon/verbs/small_fleet.h"
 #include "tests/support/scratch_folder.h"
 
@@ -43,7 +44,8 @@ class RequestHandlerTest : public ::testing::Test {
              .log = [this](const std::string& text) { log_ += text + "\n"; },
              .store_path = scratch_ / "none.db",
              .models = &models_,
-             .alarms = &alarms_}) {}
+             .alarms = &alarms_,
+             .room_for_rows = [this] { return room_; }}) {}
 
   RawClient& Add(const std::string& says = "") {
     RawClient& client = *clients_.emplace_back(std::make_unique<RawClient>(scratch_ / "s"));
@@ -73,6 +75,7 @@ class RequestHandlerTest : public ::testing::Test {
   std::string log_;
   ModelRegistry models_{&fleet_.layout()};
   AlarmRegister alarms_;
+  Status room_;  // for rows
   RequestHandler handler_;
   std::vector<std::unique_ptr<RawClient>> clients_;
   std::vector<Command> commands_;
@@ -332,10 +335,87 @@ TEST_F(RequestHandlerTest, OpenAlarmsNeedNoStore) {
 }
 
 TEST_F(RequestHandlerTest, QuestionsThatWaitForTheStoreAreBounded) {
-  RawClient& client = Add();
-  for (std::uint64_t n = 0; n <= limits::kControlClients; ++n) client.Send(Line(n + 1, "history"));
+  std::string many;
+  for (std::uint64_t n = 1; n <= limits::kControlRequestsOpen; ++n) many += Line(n, "history");
+  for (std::size_t open = 0; open < limits::kControlClients; open += limits::kControlRequestsOpen) {
+    Add(many);
+    TurnUntilQuiet();
+  }
+  EXPECT_EQ(clients_.back()->Receive(), "");
+  Add(Line(1, "history"));
   TurnUntilQuiet();
-  EXPECT_THAT(client.Receive(), HasSubstr("64 questions wait for the store"));
+  EXPECT_THAT(clients_.back()->Receive(), HasSubstr("64 questions wait for the store"));
+}
+
+TEST_F(RequestHandlerTest, WhereTooManyRowsWaitForTheDiskStopAloneIsTaken) {
+  room_ = Fail(ErrorCode::kUnavailable, "it cannot be stored: 65 MiB of rows wait");
+  std::vector<Row> rows = {
+      AlarmRow{4, Severity::kError, UnitId{1}, {}, "silent", AlarmName::kUnitSilent}};
+  alarms_.Take(WallTime::Now(), &rows);
+  Add(Line(1, "disable", {{"unit_ids", {1}}, {"reason", "stalls"}}) +
+      Line(2, "enable", {{"unit_ids", {1}}}) + Line(3, "alarms_ack", {{"ids", {4}}}) +
+      Line(4, "model_load", {{"model_toml", test::ModelText(fleet_.layout(), "night")}}) +
+      Line(5, "status"));
+  TurnUntilQuiet();
+  const std::string answers = clients_[0]->Receive();
+  std::size_t refused = 0;
+  for (std::size_t at = 0; (at = answers.find("65 MiB of rows wait", at)) != std::string::npos;)
+    refused += ++at > 0 ? 1u : 0u;
+  EXPECT_EQ(refused, 4u) << answers;
+  EXPECT_THAT(answers, HasSubstr(R"("id":5,"ok":true)")) << "a question is answered";
+  EXPECT_TRUE(commands_.empty());
+  EXPECT_EQ(models_.compensation(), nullptr) << "nothing changed";
+  EXPECT_EQ(alarms_.Count(WallTime::Now()).open, 1u) << "likewise";
+  clients_[0]->Send(Line(6, "stop"));
+  TurnUntilQuiet();
+  EXPECT_EQ(Stops(), 1u);
+  room_ = {};
+  clients_[0]->Send(Line(7, "disable", {{"unit_ids", {1}}, {"reason", "stalls"}}));
+  TurnUntilQuiet();
+  EXPECT_EQ(commands_.size(), 2u);
+}
+
+class WaitingRequestHandlerTest : public RequestHandlerTest {
+ protected:
+  WaitingRequestHandlerTest() {
+    Command apply;
+    ApplyCommand what;
+    what.targets.resize(fleet_.layout().size());
+    what.targets[0] = Pose{};
+    apply.what = std::move(what);
+    static_cast<void>(fleet_.Step({.now = {}, .commands = std::span(&apply, 1)}));
+  }
+};
+
+TEST_F(WaitingRequestHandlerTest, WaitsOfAClientAreBoundedAndAStopIsFirst) {
+  ASSERT_TRUE(fleet_.View().coordinator->busy());
+  std::string flood;
+  for (std::uint64_t id = 1; id <= 1000; ++id) flood += Line(id, "wait");
+  Add(flood);
+  TurnUntilQuiet();
+  handler_.ShowProgress(fleet_.View(HostInstant{Seconds(1).ns}));
+  TurnUntilQuiet();
+  const std::string progress = clients_[0]->Receive();
+  EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(progress, '\n')),
+            limits::kControlRequestsOpen);
+  EXPECT_THAT(progress, HasSubstr(R"({"id":8,"progress":{)"));
+  EXPECT_FALSE(Waits()) << "the other lines cost nothing until one is answered";
+  clients_[0]->Send(Line(1001, "stop"));
+  TurnUntilQuiet();
+  EXPECT_EQ(Stops(), 1u);
+}
+
+TEST_F(WaitingRequestHandlerTest, WaitsOfClientsThatAreGoneAreForgotten) {
+  ASSERT_TRUE(fleet_.View().coordinator->busy());
+  for (int n = 0; n < 100; ++n) {
+    Add(Line(1, "wait") + Line(2, "wait"));
+    TurnUntilQuiet();
+    clients_.back()->Close();
+    TurnUntilQuiet();
+  }
+  EXPECT_NE(handler_.wake_at(), kNever);
+  handler_.ShowProgress(fleet_.View(HostInstant{Seconds(1).ns}));
+  EXPECT_EQ(handler_.wake_at(), kNever) << "nobody waits any more";
 }
 
 TEST(RequestHandler, KnowsAStopFromEverythingElse) {

@@ -111,8 +111,8 @@ class Connections(unittest.TestCase):
 
     def test_a_request_that_is_too_long_is_not_sent(self):
         with FakeDaemon({"apply": {}}) as daemon, Fleet(daemon.path) as fleet:
-            with self.assertRaisesRegex(InvalidInput, "takes at most 16777216"):
-                fleet.apply([{"unit_id": 1, "target_id": "x" * (16 << 20)}])
+            with self.assertRaisesRegex(InvalidInput, "takes at most 2097152"):
+                fleet.apply([{"unit_id": 1, "target_id": "x" * (2 << 20)}])
             self.assertEqual(daemon.requests, [])
 
     def test_a_silent_daemon(self):
