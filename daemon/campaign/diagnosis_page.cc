@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "daemon/campaign/cause_words.h"
+#include "daemon/campaign/class_table.h"
 #include "daemon/campaign/diagnosis_figures.h"
 #include "daemon/campaign/verdict_sentence.h"
 #include "daemon/report/page.h"
@@ -99,6 +100,13 @@ void AddCauses(const Diagnosis& diagnosis, report::Page* page) {
   for (const sim::CauseFound& cause : diagnosis.causes) cards.push_back(CardOf(cause));
   cards.push_back(GainCard(diagnosis));
   page->Cards(cards);
+}
+
+void AddClasses(const Diagnosis& diagnosis, report::Page* page) {
+  if (diagnosis.axes.empty()) return;
+  page->Heading("Axes by class");
+  page->Table(kClassColumns, ClassRows(diagnosis.axes),
+              {Align::kLeft, Align::kRight, Align::kLeft});
 }
 
 void AddWorstUnits(const Campaign& campaign, const Diagnosis& diagnosis,
@@ -221,6 +229,7 @@ std::string DiagnosisPage(const Campaign& campaign, const Diagnosis& diagnosis,
   for (const std::string& remark : diagnosis.remarks) page.Paragraph("Note: " + remark + ".");
   if (diagnosis.verdict == sim::Verdict::kInsufficient) return page.Html();
   AddCauses(diagnosis, &page);
+  AddClasses(diagnosis, &page);
   AddResiduals(campaign, diagnosis, &page);
   AddRest(diagnosis, &page);
   return page.Html();

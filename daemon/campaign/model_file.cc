@@ -234,8 +234,10 @@ class ModelReader {
   /// Reads the shapes where each unit has a shape of its own.
   Status ReadShapes(const toml::table& table, const std::vector<double>& ids,
                     sim::Template* form) const {
-    if (!table.contains("shapes")) return {};
-    if (!form->effect->own_shape)
+    const bool found = form->form == form->effect->form_of_found_shapes;
+    if (!table.contains("shapes"))
+      return found ? Wrong(table, "shapes: this form has one for each unit") : Status();
+    if (!form->effect->own_shape && !found)
       return Wrong(table, "shapes: units have none of their own of this effect");
     FOCALFLEET_TRY_ASSIGN(const std::vector<double> shapes, Numbers(table, "shapes"));
     if (shapes.size() != ids.size())

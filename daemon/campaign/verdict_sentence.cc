@@ -41,10 +41,10 @@ std::string Percent(double share) {
   return share < 0.01 ? "below 1 %" : fmt::format("{:.0f} %", 100 * share);
 }
 
-/// The name with its axis, and the rivals with the probability of each.
+/// The name with its axis, and the rivals, with the probability of each where any is in doubt.
 std::string NamesOf(const sim::CauseFound& cause) {
   std::string text = std::string(WordsFor(cause.cause).name) + AxisOf(cause);
-  if (cause.candidates.size() < 2) return text;
+  if (cause.candidates.size() < 2 && cause.doubt == 0) return text;
   const std::vector<double> posterior = sim::PosteriorOf(cause);
   text += " (" + Percent(posterior.front()) + ")";
   constexpr std::size_t kRivalsSaid = 2;

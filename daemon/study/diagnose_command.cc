@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include <regex>
 
 #include "daemon/campaign/campaign_files.h"
+#include "daemon/campaign/class_table.h"
 #include "daemon/campaign/diagnosis_files.h"
 #include "daemon/campaign/diagnosis_page.h"
 #include "daemon/campaign/next_moves_file.h"
@@ -83,6 +85,14 @@ std::string CauseTable(const sim::Diagnosis& diagnosis) {
   return AlignColumns(rows);
 }
 
+// The classes of axes; empty where none calls for a repair.
+std::string ClassTable(const sim::Diagnosis& diagnosis) {
+  if (std::ranges::none_of(diagnosis.axes, NeedsRepair, &sim::AxisReport::is)) return "";
+  std::vector<std::vector<std::string>> rows = ClassRows(diagnosis.axes);
+  rows.insert(rows.begin(), kClassColumns);
+  return AlignColumns(rows);
+}
+
 // A table of the findings that the model's empirical terms patch without explaining them; empty
 // where there are none.
 std::string PatchTable(const sim::Diagnosis& diagnosis) {
@@ -150,6 +160,7 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
   Say(context, VerdictSentence(diagnosis));
   for (const std::string& remark : diagnosis.remarks) Say(context, "note: " + remark);
   if (!diagnosis.causes.empty()) Say(context, CauseTable(diagnosis));
+  if (const std::string classes = ClassTable(diagnosis); !classes.empty()) Say(context, classes);
   for (const auto& [why, rows] : diagnosis.outliers.why)
     Say(context, fmt::format("{} of {} rows: {}", rows, diagnosis.rows, why));
   if (!diagnosis.outliers.units.empty())

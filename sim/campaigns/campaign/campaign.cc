@@ -96,6 +96,7 @@ Campaign Keep(const Campaign& campaign, const std::vector<bool>& keep_row) {
   Campaign kept;
   kept.name = campaign.name;
   kept.units = campaign.units;
+  kept.coordinator_units = campaign.coordinator_units;
   kept.first_row.push_back(0);
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
     std::size_t rows = 0;

@@ -61,6 +61,9 @@ struct WordColumn {
 struct Campaign {
   std::string name;
   std::vector<CampaignUnit> units;
+  // The geometry by which the coordinator turned measured places into angles. Shape: (units), or
+  // empty where it is that of `units`.
+  std::vector<CampaignUnit> coordinator_units;
   std::vector<std::size_t> first_row;  // Shape: (units + 1)
   std::vector<std::int64_t> move_id;   // Shape: (rows), and so all below
   std::vector<double> from_deg[2];     // where the coordinator believed the axis to be

@@ -13,7 +13,10 @@ std::array<std::vector<double>, 2> FindBeginErrors(const UnitTrack& track) {
   constexpr int kRounds = 3;  // Newton: each squares the error
   std::array<std::vector<double>, 2> off_deg;
   for (std::vector<double>& of_axis : off_deg) of_axis.assign(track.moves, 0);
-  const CampaignUnit& table = track.facts->campaign->units[track.unit_index];
+  const Campaign& campaign = *track.facts->campaign;
+  const CampaignUnit& table =
+      (campaign.coordinator_units.empty() ? campaign.units
+                                          : campaign.coordinator_units)[track.unit_index];
   const CampaignUnit& unit = *track.unit;
   for (std::size_t i = 0; i < track.moves; ++i) {
     if (track.restarts[i] != 0) continue;

@@ -128,6 +128,8 @@ struct Effect {
   bool one_is_enough = false;  // one of `needs` is enough, as each belongs to one axis
   // Each unit may have a shape of its own, as it has its own teeth. Pre: a unit is the owner.
   bool own_shape = false;
+  // The form whose units' shapes are found from the moves before the search. -1: none.
+  int form_of_found_shapes = -1;
   // Amplitudes that physics allows. 0 and 0: up to a hundred times the usual size either way.
   double amplitude_low = 0;
   double amplitude_high = 0;

@@ -69,6 +69,7 @@ Effect MakeNeighbourCoupling() {
               "between the two and the cube of their distance.",
           .list = ListNeighbourCoupling,
           .apply = ApplyNeighbourCoupling,
+          .form_of_found_shapes = kPhased,
           .traits = {.acts_on_others = true}};
 }
 

@@ -72,8 +72,9 @@ Templates ListTemplates(const Effect& effect, const CampaignFacts& facts) {
 
 bool IsOffered(const Template& form, const CampaignFacts& facts) {
   const Templates listed = ListTemplates(*form.effect, facts);
+  const int asked = form.form == form.effect->form_of_found_shapes ? 0 : form.form;
   return std::any_of(listed.begin(), listed.end(), [&](const Template& one) {
-    return one.form == form.form && one.axis == form.axis && one.memory == form.memory &&
+    return one.form == asked && one.axis == form.axis && one.memory == form.memory &&
            one.columns == form.columns;
   });
 }

@@ -57,7 +57,8 @@ const Effect* FindEffect(std::string_view cause);
 /// or where no template can be built from these data.
 Templates ListTemplates(const Effect& effect, const CampaignFacts& facts);
 /// Whether the effect offers the template's axis, form, memory and columns in this campaign, at any
-/// shape.
+/// shape. A form whose shapes are found from moves is offered where the effect's first form is: the
+/// template has its shapes, by these moves or by others.
 bool IsOffered(const Template& form, const CampaignFacts& facts);
 
 /// The first covariate that the effect needs and the campaign lacks; empty where none is missing.

@@ -2,6 +2,7 @@
 // hand.
 #include "daemon/campaign/diagnosis_files.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/campaign/class_table.h"
 #include "sim/campaigns/diagnosis/decide/decide.h"
 
 namespace focalfleet {
@@ -90,6 +92,15 @@ TEST(UnitsByClass, HaveARowForEachUnitAndAxis) {
             "7,phi,stuck,,,38,-12.35,0,1234.6,39\n"
             "9,theta,stuck,,,0,3.00,0,,0\n"
             "9,phi,unknown,,,0,,0,0.0,0\n");
+}
+
+TEST(UnitsByClass, AreATableOfThoseToRepair) {
+  EXPECT_EQ(
+      ClassRows(WithAxes().axes),
+      (std::vector<std::vector<std::string>>{
+          {"scale", "1", "theta 7"}, {"stuck", "2", "phi 7, theta 9"}, {"unknown", "1", ""}}));
+  const std::vector<sim::AxisReport> many(11, {.unit_id = 3, .is = sim::AxisClass::kSlipping});
+  EXPECT_THAT(ClassRows(many)[0][2], testing::EndsWith("theta 3, theta 3 and 3 more"));
 }
 
 TEST(UnitsByClass, AreCountedInTheReport) {

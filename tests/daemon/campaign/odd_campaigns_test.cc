@@ -166,6 +166,8 @@ const Odd kOdd[] = {
                     .rest_noise_deg = 0,
                     .effects = {{.cause = "backlash", .amplitude = 0.2, .axis = "phi"}}});
      }},
+    {"PulledByRotorsAnywhere",
+     [] { return sim::test::Pulled(sim::test::RandomPhases_deg(24, 6), 6); }},
     {"OneUnit", [] { return Made({.units = 1, .moves = 40}); }},
     {"OneUnitInWholePixels", [] { return InSteps(Made({.units = 1, .moves = 40}), 0.2); }},
     {"OneUnitWithoutNoise",

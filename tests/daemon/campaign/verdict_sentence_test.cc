@@ -57,6 +57,13 @@ TEST(VerdictSentence, HasTheProbabilityOfANameThatHasARival) {
               HasSubstr("backlash of both axes (97 %) or wind-up under friction (3 %)."));
 }
 
+TEST(VerdictSentence, HasTheProbabilityOfANameInDoubt) {
+  sim::CauseFound cause = Backlash();
+  cause.doubt = 0.05;
+  EXPECT_THAT(TextOf(Explained({cause})).says(),
+              HasSubstr("backlash of both axes (95 %). Nothing"));
+}
+
 TEST(VerdictSentence, NamesTheUnits) {
   sim::CauseFound cause = Backlash();
   cause.all_units = false;

@@ -53,13 +53,13 @@ void MoveNameless(Diagnosis* diagnosis) {
   std::erase_if(diagnosis->causes, [&](const CauseFound& cause) {
     if (cause.candidates.size() < kAnything) return false;
     const bool of_an_axis = cause.axis == "theta" || cause.axis == "phi";
-    diagnosis->unknown.push_back({.covariate = of_an_axis ? cause.axis + "_cmd_deg" : "t_s",
-                                  .channel = (of_an_axis ? cause.axis + ": what " : "what ") +
-                                             std::to_string(cause.candidates.size()) +
-                                             " causes could be",
-                                  .p_value = std::exp(-cause.delta_log_likelihood),
-                                  .size_um = cause.size_um,
-                                  .delta_log_likelihood = cause.delta_log_likelihood});
+    diagnosis->unknown.push_back(
+        {.covariate = of_an_axis ? cause.axis + "_cmd_deg" : std::string(kOrder),
+         .channel = (of_an_axis ? cause.axis + ": what " : "what ") +
+                    std::to_string(cause.candidates.size()) + " causes could be",
+         .p_value = std::exp(-cause.delta_log_likelihood),
+         .size_um = cause.size_um,
+         .delta_log_likelihood = cause.delta_log_likelihood});
     return true;
   });
 }

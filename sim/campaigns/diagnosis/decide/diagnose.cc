@@ -169,17 +169,32 @@ double ShareBeyondReach(const Fit& fit) {
 }
 
 // The part that the given model already explains is no misfit. Its effects are subtracted from the
-// measured places, and its geometry replaces the table's.
-void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel,
-              Campaign* campaign) {
+// measured places, and its geometry replaces the table's. The coordinator has closed its loop by
+// the geometry that it had.
+// Returns the displacements that were subtracted.
+Places TakeAway(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel,
+                Campaign* campaign) {
+  campaign->coordinator_units = std::move(campaign->units);
   campaign->units = model.units;
   CampaignModel plain;
   plain.units = model.units;
-  const Places with = Predict(model, facts, parallel), without = Predict(plain, facts, parallel);
+  Places taken = Predict(model, facts, parallel);
+  const Places without = Predict(plain, facts, parallel);
   for (std::size_t row = 0; row < campaign->rows(); ++row) {
-    campaign->x_mm[row] -= with.x_mm[row] - without.x_mm[row];
-    campaign->y_mm[row] -= with.y_mm[row] - without.y_mm[row];
+    taken.x_mm[row] -= without.x_mm[row], taken.y_mm[row] -= without.y_mm[row];
+    campaign->x_mm[row] -= taken.x_mm[row], campaign->y_mm[row] -= taken.y_mm[row];
   }
+  return taken;
+}
+
+// The classes of axes by the places as measured, whatever a given model explains of them. An axis
+// that turns by another share of its command is to be seen to even where the model has that share.
+// Names that are exchanged keep the displacements of the unit that each was taken for.
+std::vector<AxisReport> ClassifyAsMeasured(Campaign campaign, const Places& taken,
+                                           const std::vector<CampaignUnit>& units) {
+  for (std::size_t row = 0; row < taken.x_mm.size(); ++row)
+    campaign.x_mm[row] += taken.x_mm[row], campaign.y_mm[row] += taken.y_mm[row];
+  return ClassifyAxes(campaign, units);
 }
 
 // Names a contact of arms for these rows, which are far no more then.
@@ -326,14 +341,15 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   DescribeRows(repeated, facts, &diagnosis);
   std::vector<char> aside;
   diagnosis.outliers = FindBeforeFit(facts, repeated, &aside);
+  diagnosis.axes = ClassifyAxes(campaign, campaign.units);
   CampaignModel before;
+  Places taken;
   if (options.before != nullptr) {
     before = *options.before;
     diagnosis.not_testable = LeaveOutUntestable(facts, &before);
-    TakeAway(before, facts, options.parallel, &campaign);
+    taken = TakeAway(before, facts, options.parallel, &campaign);
   }
   diagnosis.model.units = campaign.units;
-  diagnosis.axes = ClassifyAxes(campaign, campaign.units);
   diagnosis.insufficient = WhyInsufficient(facts, aside);
   if (!diagnosis.insufficient.empty()) return diagnosis;
   options.progress(0.02, "static geometry");
@@ -347,7 +363,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
         "of their arms";
     return diagnosis;
   }
-  if (facts.closed.empty()) diagnosis.axes = ClassifyAxes(campaign, fit.model.units);
+  if (facts.closed.empty()) diagnosis.axes = ClassifyAsMeasured(campaign, taken, fit.model.units);
   diagnosis.x_before_um = fit.x_um, diagnosis.y_before_um = fit.y_um;
   for (const std::size_t axis : {kTheta, kPhi})
     facts.rotor_phase_deg[axis] = FindRotorPhases(fit, axis);

@@ -50,12 +50,11 @@ void UpdateWeights(Fit* fit);  // from residuals and noise
 /// Makes a Gauss-Newton step of geometry and all amplitudes, then updates the residuals.
 void StepFit(Fit* fit);
 
-/// Repeats steps, noise and weights in turn, `rounds` at most, until the amplitudes rest.
+/// Repeats noise, weights and a step in turn, `rounds` times, and ends with noise and weights.
 void SettleFit(Fit* fit, int rounds);
 
 /// Fits a model whose terms or events were changed: a step, as amplitudes are linear, and two
-/// rounds of SettleFit at most for weights and noise. Other numbers of rounds have not been
-/// measured.
+/// rounds of SettleFit for weights and noise. Other numbers of rounds have not been measured.
 void FitAnew(Fit* fit);
 
 /// Lets the zeros differ from homing to homing, and fits them.

@@ -7,120 +7,17 @@
 #include <numbers>
 
 #include "sim/campaigns/diagnosis/model/fit.h"
-#include "sim/campaigns/diagnosis/model/rest_filter.h"
+#include "sim/campaigns/diagnosis/model/noise_cost.h"
 #include "sim/campaigns/diagnosis/score/chances.h"
 
 namespace focalfleet::sim {
 namespace {
 
 constexpr double kMedianSquare = 2 * std::numbers::ln2;  // of a whitened 2-D normal residual
-constexpr std::size_t kVarianceRowsMax = 4000;           // rows that the variances come from
 
 // Rest errors are expected to be as large as the camera's noise, give or take this factor. Half and
 // twice of it change nothing above some 100 rows: a row says far more than the prior.
 constexpr double kExpectedWithin = 10;
-
-struct NoiseMove {
-  bool restarts = false, theta_moves = false, phi_moves = false;
-  bool seen = false;
-  double x_um = 0, y_um = 0;
-  double turn_um[4] = {0, 0, 0, 0};
-  double exposure_factor = 1;
-};
-struct NoiseUnit {
-  double factor = 1;
-  std::vector<NoiseMove> moves;
-  std::vector<double> turn_um;  // of the seen moves. Shape: (seen, 4)
-  // Effects of the unit's own unknowns (geometry, own amplitudes). Shape: (2 seen, unknowns).
-  Eigen::MatrixXd own;
-};
-
-Eigen::MatrixXd OwnDisplacements(const Fit& fit, std::size_t unit, const WhiteUnit& white) {
-  Eigen::MatrixXd own = GeometryDisplacements(white);
-  PoseErrors errors;
-  for (const ModelTerm& term : fit.model.terms) {
-    if (term.sharing != Sharing::kUnit || term.group_of_unit[unit] == kNoGroup) continue;
-    for (std::size_t c = 0; c < term.form.columns; ++c) {
-      ApplyColumn(white.track, term.form, c, 1, &errors);
-      own.conservativeResize(Eigen::NoChange, own.cols() + 1);
-      Displacement(white, errors, own.col(own.cols() - 1).data());
-    }
-  }
-  for (const Homing& homing : FreeHomingsOf(fit.model, white.track)) {
-    ApplyHoming(white.track, homing, &errors);
-    own.conservativeResize(Eigen::NoChange, own.cols() + 1);
-    Displacement(white, errors, own.col(own.cols() - 1).data());
-  }
-  // Columns are scaled to a common size: only the plane that they span matters.
-  for (Eigen::Index c = 0; c < own.cols(); ++c)
-    if (const double length = own.col(c).norm(); length > 0) own.col(c) /= length;
-  return own;
-}
-
-// Whole units, evenly from the fleet.
-std::vector<NoiseUnit> Sample(const Fit& fit) {
-  const Campaign& campaign = *fit.facts->campaign;
-  const std::size_t units = campaign.units.size();
-  const std::size_t stride =
-      std::max<std::size_t>(1, (campaign.rows() + kVarianceRowsMax - 1) / kVarianceRowsMax);
-  std::vector<NoiseUnit> sample;
-  for (std::size_t unit = 0; unit < units; unit += stride) {
-    NoiseUnit one{fit.noise.unit_factor[unit], {}, {}, {}};
-    std::vector<double> weights;
-    const WhiteUnit white = WhitenAnew(fit, unit, &weights);
-    const UnitTrack& track = white.track;
-    one.moves.resize(track.moves);
-    for (std::size_t i = 0; i < track.moves; ++i)
-      one.moves[i].restarts = track.restarts[i] != 0,
-      one.moves[i].theta_moves = track.step_deg[0][i] != 0,
-      one.moves[i].phi_moves = track.step_deg[1][i] != 0;
-    for (std::size_t k = 0; k < white.moves.size(); ++k) {
-      const std::size_t row = track.first_row + white.moves[k];
-      NoiseMove& move = one.moves[white.moves[k]];
-      move.seen = true;
-      move.x_um = fit.x_um[row], move.y_um = fit.y_um[row];
-      std::copy_n(&white.turn_um[4 * k], 4, move.turn_um);
-      if (!fit.noise.exposure_factor.empty())
-        move.exposure_factor = fit.noise.exposure_factor[fit.facts->exposures.of_row[row]];
-    }
-    one.turn_um = white.turn_um;
-    one.own = OwnDisplacements(fit, unit, white);
-    sample.push_back(std::move(one));
-  }
-  return sample;
-}
-
-// The cost of a unit is the density of each place given those before it, and the part that the
-// unit's own unknowns have absorbed. The likelihood is restricted, with the unknowns to second
-// order about the residuals.
-// Source: Patterson and Thompson, Biometrika 58 (1971) 545.
-double CostOf(const NoiseUnit& unit, const Noise& noise) {
-  constexpr double kLoose = 1e-12;  // of an unknown that the rows do not show
-  double cost = 0;
-  RestFilter filter(noise, unit.factor);
-  std::vector<RowFilter> rows;
-  Eigen::VectorXd y(unit.own.rows());
-  for (const NoiseMove& move : unit.moves) {
-    filter.Move(move.restarts, move.theta_moves, move.phi_moves);
-    if (!move.seen) continue;
-    filter.See(move.turn_um, move.exposure_factor);
-    const double square = filter.SquareLength(move.x_um, move.y_um);
-    cost += std::log(filter.determinant()) / 2 + MinusLogDensity(square);
-    rows.push_back(filter.Take(std::min(1.0, (kPlaceFreedom + 2) / (kPlaceFreedom + square))));
-    filter.Whiten(rows.back(), move.turn_um, move.x_um, move.y_um,
-                  &y[static_cast<Eigen::Index>(2 * rows.size() - 2)]);
-  }
-  Eigen::MatrixXd own = unit.own;
-  for (Eigen::Index c = 0; c < own.cols(); ++c) ApplyFilter(rows, unit.turn_um, own.col(c).data());
-  Eigen::MatrixXd normal = own.transpose() * own;
-  normal.diagonal().array() += kLoose;
-  const Eigen::VectorXd right = own.transpose() * y;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(normal);
-  cost -= right.dot(solver.solve(right)) / 2;
-  for (Eigen::Index c = 0; c < own.cols(); ++c)
-    cost += std::log(std::max(solver.vectorD()[c], kLoose)) / 2;
-  return cost;
-}
 
 double Lever_um(const std::vector<NoiseUnit>& sample, int axis) {
   double most = 0;
@@ -181,9 +78,9 @@ class NoiseSearch {
 
  private:
   static constexpr double kFine = 1.015;
-  [[nodiscard]] double Cost(const Noise& noise) const {
+  [[nodiscard]] double Cost(const Noise& noise) {
     double cost = 0;
-    for (const NoiseUnit& unit : sample_) cost += CostOf(unit, noise);
+    for (const NoiseUnit& unit : sample_) cost += CostOf(unit, noise, &scratch_);
     for (int axis = 0; axis < 2; ++axis)
       cost += PriorCost(noise.rest_deg[axis] * lever_um_[axis], noise) +
               PriorCost(noise.angle_deg[axis] * lever_um_[axis], noise);
@@ -211,6 +108,7 @@ class NoiseSearch {
   double lever_um_[2] = {1, 1};
   Noise best_;
   double cost_ = 0;
+  NoiseScratch scratch_;
 };
 
 // A search without a previous result. Errors that are held and errors that are not look alike from
@@ -469,7 +367,7 @@ void FitFactors(Fit* fit) {
 void UpdateNoise(Fit* fit) {
   Noise& noise = fit->noise;
   if (noise.unit_factor.empty()) noise.unit_factor.assign(fit->model.units.size(), 1);
-  const std::vector<NoiseUnit> sample = Sample(*fit);
+  const std::vector<NoiseUnit> sample = SampleForNoise(*fit);
   FitVariances(sample, &noise);
   FitFactors(fit);
 }

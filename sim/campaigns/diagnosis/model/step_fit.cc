@@ -4,6 +4,7 @@
 
 #include "sim/campaigns/diagnosis/model/discrepancy.h"
 #include "sim/campaigns/diagnosis/model/fit.h"
+#include "sim/campaigns/diagnosis/score/chances.h"
 
 namespace focalfleet::sim {
 namespace {

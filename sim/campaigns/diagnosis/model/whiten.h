@@ -16,7 +16,6 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <cmath>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -70,14 +69,6 @@ struct WhiteUnit {
 
 /// The same for the rows of a filter. Shapes: filter (n), turn_um (n, 4), xy_um (2 n).
 void ApplyFilter(std::span<const RowFilter> filter, std::span<const double> turn_um, double* xy_um);
-
-/// Degrees of freedom of Student's t in two dimensions, by which a likelihood judges a whitened
-/// place. An outlier costs the logarithm of its distance, so that its noise does not decide.
-inline constexpr double kPlaceFreedom = 5;
-/// Minus the log density of a squared whitened length, without the constant part.
-inline double MinusLogDensity(double square) {
-  return (kPlaceFreedom + 2) / 2 * std::log1p(square / kPlaceFreedom);
-}
 
 /// The unit's rows with the weights that the fit has.
 WhiteUnit Whiten(const Fit& fit, std::size_t unit);

@@ -56,16 +56,6 @@ double LogChoose(double n, double k) {
   return std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1);
 }
 
-double BinomialTail(std::size_t hits, std::size_t tries, double share) {
-  double tail = 0;
-  const auto n = static_cast<double>(tries);
-  for (std::size_t at = hits; at <= tries; ++at) {
-    const auto k = static_cast<double>(at);
-    tail += std::exp(LogChoose(n, k)) * std::pow(share, k) * std::pow(1 - share, n - k);
-  }
-  return std::min(tail, 1.0);
-}
-
 double LogLeastOf(double log_p, double tests) {
   // The result is 1 - (1 - p)^n; for small n p the first term is all.
   const double p = std::exp(log_p);

@@ -2,6 +2,7 @@
 // underflow. The chance of a family of correlated tests follows from its effective number of tests.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -14,6 +15,14 @@ namespace focalfleet::sim {
 /// the other four they have not been measured.
 inline constexpr double kShareOfSearch = 0.3;
 
+/// Degrees of freedom of Student's t in two dimensions, by which a likelihood judges a whitened
+/// place. An outlier costs the logarithm of its distance, so that its noise does not decide.
+inline constexpr double kPlaceFreedom = 5;
+/// Minus the log density of a squared whitened length, without the constant part.
+inline double MinusLogDensity(double square) {
+  return (kPlaceFreedom + 2) / 2 * std::log1p(square / kPlaceFreedom);
+}
+
 /// ln P(chi-square of `dof` degrees of freedom > x). 0 for x <= 0. Pre: dof > 0.
 double LogChiSquareTail(double x, double dof);
 
@@ -22,9 +31,6 @@ double LogLeastOf(double log_p, double tests);
 
 /// ln of the number of ways to take k of n. Pre: 0 <= k <= n.
 double LogChoose(double n, double k);
-
-/// P(at least `hits` of `tries`), each with probability `share`. Pre: 0 <= share <= 1.
-double BinomialTail(std::size_t hits, std::size_t tries, double share);
 
 /// ln(sum exp(terms)); -infinity for none.
 double LogSum(std::span<const double> terms);

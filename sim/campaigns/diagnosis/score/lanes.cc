@@ -11,20 +11,32 @@
 namespace focalfleet::sim {
 namespace {
 
-// Two lanes in one register, which every machine has. A compiler left to itself gathers lanes
-// across rows instead.
-struct PairOf {
-  using Numbers [[gnu::vector_size(16), gnu::may_alias]] = double;
+// Four lanes in one register, or in two where registers are half as wide. A compiler left to itself
+// gathers lanes across rows instead.
+struct FourOf {
+  using Numbers [[gnu::vector_size(32), gnu::may_alias]] = double;
 };
-using NumberPair = PairOf::Numbers;
-constexpr std::size_t kPairs = sizeof(Lanes) / sizeof(NumberPair);
+using Four = FourOf::Numbers;
+constexpr std::size_t kFours = sizeof(Lanes) / sizeof(Four);
 
-NumberPair* PairsOf(Lanes* lanes) { return reinterpret_cast<NumberPair*>(lanes->at); }
-const NumberPair* PairsOf(const Lanes* lanes) {
-  return reinterpret_cast<const NumberPair*>(lanes->at);
+// Makes a second version of a function, for machines with wide registers. Both do the same
+// operations on each lane, and none of them is fused: the results are the same. Sanitizers run
+// before the loader can choose.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define FOCALFLEET_ALSO_WIDE [[gnu::target_clones("avx2", "default")]]
+#else
+#define FOCALFLEET_ALSO_WIDE
+#endif
+
+[[gnu::always_inline]] inline Four* FoursOf(Lanes* lanes) {
+  return reinterpret_cast<Four*>(lanes->at);
 }
-void Put(const NumberPair* pairs, Lanes* lanes) {
-  for (std::size_t j = 0; j < kPairs; ++j) PairsOf(lanes)[j] = pairs[j];
+[[gnu::always_inline]] inline const Four* FoursOf(const Lanes* lanes) {
+  return reinterpret_cast<const Four*>(lanes->at);
+}
+[[gnu::always_inline]] inline void Put(const Four* fours, Lanes* lanes) {
+  for (std::size_t j = 0; j < kFours; ++j) FoursOf(lanes)[j] = fours[j];
 }
 
 bool IsAllZero(const std::vector<double>& values) {
@@ -60,29 +72,30 @@ void PutDisplacement(const WhiteUnit& white, const PoseErrors& errors, std::size
   for (std::size_t r = 0; r < column.size(); ++r) rows[r].at[lane] = column[r];
 }
 
-void WhitenLanes(const WhiteUnit& white, Lanes* rows) {
+FOCALFLEET_ALSO_WIDE
+void WhitenLanes(std::span<const RowFilter> filter, const double* turn_um, const Lanes* from,
+                 Lanes* to) {
   // Rest errors, estimated from the rows so far.
-  NumberPair theta[kPairs] = {}, phi[kPairs] = {}, x[kPairs] = {}, y[kPairs] = {};
-  const RowFilter* f = white.filter.data();
-  const double* t = white.turn_um.data();
-  for (std::size_t k = 0; k < white.filter.size(); ++k, ++f, t += 4) {
-    NumberPair* to_x = PairsOf(rows + 2 * k);
-    NumberPair* to_y = PairsOf(rows + 2 * k + 1);
-    for (std::size_t j = 0; j < kPairs; ++j) {
-      const NumberPair a = theta[j] * f->keep[0], b = phi[j] * f->keep[1];
-      const NumberPair c = x[j] * f->keep[2], d = y[j] * f->keep[2];
-      const NumberPair dx = to_x[j] - t[0] * a - t[2] * b - c;
-      const NumberPair dy = to_y[j] - t[1] * a - t[3] * b - d;
-      theta[j] = a + (f->gain[0] * dx + f->gain[1] * dy);
-      phi[j] = b + (f->gain[2] * dx + f->gain[3] * dy);
-      x[j] = c + (f->gain[4] * dx + f->gain[5] * dy);
-      y[j] = d + (f->gain[6] * dx + f->gain[7] * dy);
-      to_x[j] = f->w[0] * dx + f->w[1] * dy;
-      to_y[j] = f->w[1] * dx + f->w[2] * dy;
+  Four theta[kFours] = {}, phi[kFours] = {}, x[kFours] = {}, y[kFours] = {};
+  const double* t = turn_um;
+  for (const RowFilter& f : filter) {
+    for (std::size_t j = 0; j < kFours; ++j) {
+      const Four a = theta[j] * f.keep[0], b = phi[j] * f.keep[1];
+      const Four c = x[j] * f.keep[2], d = y[j] * f.keep[2];
+      const Four dx = FoursOf(from)[j] - t[0] * a - t[2] * b - c;
+      const Four dy = FoursOf(from + 1)[j] - t[1] * a - t[3] * b - d;
+      theta[j] = a + (f.gain[0] * dx + f.gain[1] * dy);
+      phi[j] = b + (f.gain[2] * dx + f.gain[3] * dy);
+      x[j] = c + (f.gain[4] * dx + f.gain[5] * dy);
+      y[j] = d + (f.gain[6] * dx + f.gain[7] * dy);
+      FoursOf(to)[j] = f.w[0] * dx + f.w[1] * dy;
+      FoursOf(to + 1)[j] = f.w[1] * dx + f.w[2] * dy;
     }
+    from += 2, to += 2, t += 4;
   }
 }
 
+FOCALFLEET_ALSO_WIDE
 void MultiplyLanes(const Eigen::MatrixXd& columns, const Lanes* rows, Lanes* sums) {
   const auto n = static_cast<std::size_t>(columns.rows());
   const auto count = static_cast<std::size_t>(columns.cols());
@@ -90,10 +103,10 @@ void MultiplyLanes(const Eigen::MatrixXd& columns, const Lanes* rows, Lanes* sum
   for (std::size_t c = 0; c < count; c += 2, a += 2 * n) {
     // Two sums at a time wait less for each other.
     const double* b = c + 1 < count ? a + n : a;
-    NumberPair first[kPairs] = {}, second[kPairs] = {};
+    Four first[kFours] = {}, second[kFours] = {};
     for (std::size_t r = 0; r < n; ++r) {
-      const NumberPair* row = PairsOf(rows + r);
-      for (std::size_t j = 0; j < kPairs; ++j) {
+      const Four* row = FoursOf(rows + r);
+      for (std::size_t j = 0; j < kFours; ++j) {
         first[j] += a[r] * row[j];
         second[j] += b[r] * row[j];
       }
@@ -103,41 +116,59 @@ void MultiplyLanes(const Eigen::MatrixXd& columns, const Lanes* rows, Lanes* sum
   }
 }
 
+FOCALFLEET_ALSO_WIDE
 void SubtractColumns(const Eigen::MatrixXd& columns, const Lanes* parts, const Lanes* rows,
                      Lanes* left) {
   const auto n = static_cast<std::size_t>(columns.rows());
   const auto count = static_cast<std::size_t>(columns.cols());
   for (std::size_t r = 0; r < n; ++r) {
-    const NumberPair* row = PairsOf(rows + r);
-    NumberPair sum[kPairs] = {row[0], row[1], row[2], row[3]};
+    const Four* row = FoursOf(rows + r);
+    Four sum[kFours] = {row[0], row[1]};
     const double* a = columns.data() + r;
     for (std::size_t c = 0; c < count; ++c, a += n) {
-      const NumberPair* part = PairsOf(parts + c);
-      for (std::size_t j = 0; j < kPairs; ++j) sum[j] -= *a * part[j];
+      const Four* part = FoursOf(parts + c);
+      for (std::size_t j = 0; j < kFours; ++j) sum[j] -= *a * part[j];
     }
     Put(sum, left + r);
   }
 }
 
+FOCALFLEET_ALSO_WIDE
+LaneProducts MultiplyBlocks(const Lanes* a, const Lanes* b, std::size_t rows) {
+  // Half of the lanes of `a` at a time: sums of more would not stay in registers.
+  LaneProducts out;
+  for (std::size_t begin = 0; begin < kLanes; begin += kLanes / 2) {
+    Four sum[kLanes / 2][kFours] = {};
+    for (std::size_t r = 0; r < rows; ++r)
+      for (std::size_t i = 0; i < kLanes / 2; ++i)
+        for (std::size_t j = 0; j < kFours; ++j)
+          sum[i][j] += a[r].at[begin + i] * FoursOf(b + r)[j];
+    for (std::size_t i = 0; i < kLanes / 2; ++i) Put(sum[i], &out[begin + i]);
+  }
+  return out;
+}
+
+FOCALFLEET_ALSO_WIDE
 Lanes SquareLanes(const Lanes* rows, std::size_t count) {
-  NumberPair sum[kPairs] = {};
+  Four sum[kFours] = {};
   for (std::size_t r = 0; r < count; ++r) {
-    const NumberPair* row = PairsOf(rows + r);
-    for (std::size_t j = 0; j < kPairs; ++j) sum[j] += row[j] * row[j];
+    const Four* row = FoursOf(rows + r);
+    for (std::size_t j = 0; j < kFours; ++j) sum[j] += row[j] * row[j];
   }
   Lanes out;
   Put(sum, &out);
   return out;
 }
 
+FOCALFLEET_ALSO_WIDE
 OwnProducts MultiplyByThemselves(const Lanes* rows, std::size_t moves, Lanes* products) {
-  NumberPair sum[kPairs] = {}, most[kPairs] = {};
+  Four sum[kFours] = {}, most[kFours] = {};
   for (std::size_t k = 0; k < moves; ++k) {
-    const NumberPair* x = PairsOf(rows + 2 * k);
-    const NumberPair* y = PairsOf(rows + 2 * k + 1);
-    NumberPair* product = PairsOf(products + k);
-    for (std::size_t j = 0; j < kPairs; ++j) {
-      const NumberPair both = x[j] * x[j] + y[j] * y[j];
+    const Four* x = FoursOf(rows + 2 * k);
+    const Four* y = FoursOf(rows + 2 * k + 1);
+    Four* product = FoursOf(products + k);
+    for (std::size_t j = 0; j < kFours; ++j) {
+      const Four both = x[j] * x[j] + y[j] * y[j];
       product[j] = both;
       sum[j] += both;
       most[j] = most[j] < both ? both : most[j];
@@ -148,16 +179,17 @@ OwnProducts MultiplyByThemselves(const Lanes* rows, std::size_t moves, Lanes* pr
   return out;
 }
 
+FOCALFLEET_ALSO_WIDE
 Lanes MultiplyByData(const Lanes* rows, const Eigen::VectorXd& y, Lanes* products) {
-  NumberPair sum[kPairs] = {};
+  Four sum[kFours] = {};
   const double* data = y.data();
   const auto moves = static_cast<std::size_t>(y.size()) / 2;
   for (std::size_t k = 0; k < moves; ++k, data += 2) {
-    const NumberPair* first = PairsOf(rows + 2 * k);
-    const NumberPair* second = PairsOf(rows + 2 * k + 1);
-    NumberPair* product = PairsOf(products + k);
-    for (std::size_t j = 0; j < kPairs; ++j) {
-      const NumberPair both = first[j] * data[0] + second[j] * data[1];
+    const Four* first = FoursOf(rows + 2 * k);
+    const Four* second = FoursOf(rows + 2 * k + 1);
+    Four* product = FoursOf(products + k);
+    for (std::size_t j = 0; j < kFours; ++j) {
+      const Four both = first[j] * data[0] + second[j] * data[1];
       product[j] = both;
       sum[j] += both;
     }
@@ -168,23 +200,32 @@ Lanes MultiplyByData(const Lanes* rows, const Eigen::VectorXd& y, Lanes* product
 }
 
 void AddLanes(const Lanes& from, Lanes* to) {
-  for (std::size_t j = 0; j < kPairs; ++j) PairsOf(to)[j] += PairsOf(&from)[j];
+  for (std::size_t j = 0; j < kFours; ++j) FoursOf(to)[j] += FoursOf(&from)[j];
 }
 
+FOCALFLEET_ALSO_WIDE
+void AddLanesAt(const Lanes* from, std::span<const std::size_t> at, Lanes* to) {
+  for (const std::size_t place : at) {
+    for (std::size_t j = 0; j < kFours; ++j) FoursOf(to + place)[j] += FoursOf(from)[j];
+    ++from;
+  }
+}
+
+FOCALFLEET_ALSO_WIDE
 Lanes SumAlikeNeighbours(const Lanes* b, const Lanes* g, const Lanes& own, std::size_t moves) {
   static_assert(kNeighbourLags == 4);
   constexpr double w[] = {NeighbourShare(1), NeighbourShare(2), NeighbourShare(3),
                           NeighbourShare(4)};
   Lanes out;
-  for (std::size_t j = 0; j < kPairs; ++j) {
-    const NumberPair mean = PairsOf(&own)[j];
-    NumberPair sum = {}, past[kNeighbourLags] = {};
+  for (std::size_t j = 0; j < kFours; ++j) {
+    const Four mean = FoursOf(&own)[j];
+    Four sum = {}, past[kNeighbourLags] = {};
     for (std::size_t k = 0; k < moves; ++k) {
-      const NumberPair v = PairsOf(b + k)[j] - PairsOf(g + k)[j] * mean;
+      const Four v = FoursOf(b + k)[j] - FoursOf(g + k)[j] * mean;
       sum += v * (v + 2 * (w[0] * past[0] + w[1] * past[1] + w[2] * past[2] + w[3] * past[3]));
       past[3] = past[2], past[2] = past[1], past[1] = past[0], past[0] = v;
     }
-    PairsOf(&out)[j] = sum;
+    FoursOf(&out)[j] = sum;
   }
   for (double& value : out.at) value = std::max(value, 0.0);
   return out;

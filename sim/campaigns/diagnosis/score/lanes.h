@@ -5,7 +5,9 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <array>
 #include <cstddef>
+#include <span>
 
 #include "sim/campaigns/diagnosis/model/whiten.h"
 
@@ -23,8 +25,10 @@ struct alignas(64) Lanes {
 void PutDisplacement(const WhiteUnit& white, const PoseErrors& errors, std::size_t lane,
                      Lanes* rows);
 
-/// Whitens every lane, as WhiteUnit::Apply does a single column.
-void WhitenLanes(const WhiteUnit& white, Lanes* rows);
+/// Whitens every lane, as ApplyFilter does a single column. `from` and `to` may be the same rows.
+/// Shapes: filter (moves), turn_um (moves, 4).
+void WhitenLanes(std::span<const RowFilter> filter, const double* turn_um, const Lanes* from,
+                 Lanes* to);
 
 /// sums[c] = the c-th column times each lane. Shapes: columns (2 moves, c), sums (c).
 void MultiplyLanes(const Eigen::MatrixXd& columns, const Lanes* rows, Lanes* sums);
@@ -32,6 +36,10 @@ void MultiplyLanes(const Eigen::MatrixXd& columns, const Lanes* rows, Lanes* sum
 /// left = rows - columns * parts. Shapes: parts (c), left as rows.
 void SubtractColumns(const Eigen::MatrixXd& columns, const Lanes* parts, const Lanes* rows,
                      Lanes* left);
+
+/// Products of each lane of `a` with each of `b`, summed over the rows. Shape: (lanes of a).
+using LaneProducts = std::array<Lanes, kLanes>;
+LaneProducts MultiplyBlocks(const Lanes* a, const Lanes* b, std::size_t rows);
 
 /// Squared length of each lane.
 Lanes SquareLanes(const Lanes* rows, std::size_t count);
@@ -46,6 +54,8 @@ OwnProducts MultiplyByThemselves(const Lanes* rows, std::size_t moves, Lanes* pr
 Lanes MultiplyByData(const Lanes* rows, const Eigen::VectorXd& y, Lanes* products);
 
 void AddLanes(const Lanes& from, Lanes* to);
+/// Adds the k-th of `from` to the at[k]-th of `to`.
+void AddLanesAt(const Lanes* from, std::span<const std::size_t> at, Lanes* to);
 
 /// Variance of the sum of each lane's scores b - g own about its own fit, where neighbours may be
 /// alike (neighbour_sum.h). Shapes: b, g (moves).

@@ -80,11 +80,6 @@ void AddExposureProducts(const std::vector<double>& products,
   }
 }
 
-void AddAtExposures(const std::vector<Lanes>& of_move, const std::vector<std::size_t>& exposure,
-                    Lanes* sums) {
-  for (std::size_t k = 0; k < exposure.size(); ++k) AddLanes(of_move[k], sums + exposure[k]);
-}
-
 // Scores a unit in the lanes of one block after the other.
 class BlockScorer {
  public:
@@ -200,12 +195,12 @@ class BlockScorer {
   void TakeLook(const UnitScorer::UnitLook& look, ScorePass* pass, LookSums* part) {
     const std::size_t exposures = part_.exposures.size();
     const Lanes b = MultiplyByData(scratch_.m.data(), look.y, scratch_.by.data());
-    AddAtExposures(scratch_.by, scratch_.exposure, &part->exposure_b[block_ * exposures]);
+    AddLanesAt(scratch_.by.data(), scratch_.exposure, &part->exposure_b[block_ * exposures]);
     Lanes target_b;
     MultiplyLanes(look.target, scratch_.m.data(), &target_b);
     const Block& block = plan_.blocks[block_];
     if (block.single) {
-      AddAtExposures(scratch_.gg, scratch_.exposure, &part->exposure_g[block_ * exposures]);
+      AddLanesAt(scratch_.gg.data(), scratch_.exposure, &part->exposure_g[block_ * exposures]);
       TakeSingles(look, b, part);
     }
     for (std::size_t i = 0; i < block.forms.size(); ++i) {

@@ -107,7 +107,7 @@ void UnitScorer::MakeSignatures(const Templates& templates, const Block& block,
       PutDisplacement(white_, errors_, placed.lane + c, rows->data());
     }
   }
-  WhitenLanes(white_, rows->data());
+  WhitenLanes(white_.filter, white_.turn_um.data(), rows->data(), rows->data());
 }
 
 void UnitScorer::MakeColumns(std::size_t t, Index shared_begin) {

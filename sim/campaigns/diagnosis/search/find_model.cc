@@ -75,6 +75,27 @@ Selection FindTerms(const Templates& templates, const DiagnoseOptions& options,
   return selection;
 }
 
+double AtItsPrice(const Fit& walk) { return NegativeBic(walk) - PriceOfWalk(walk); }
+
+// Drops terms that a walk explains as well once they are gone. Beside such a term the walk's noise
+// is fitted to what the term leaves, and the term's evidence is by that noise.
+void DropWhatTheWalkTakes(Fit* fit, Selection* selection) {
+  constexpr int kRounds = 3;
+  for (std::size_t t = 0; t < fit->model.terms.size();) {
+    Fit without = *fit;
+    without.model.terms.erase(without.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    StepFit(&without);
+    SettleFit(&without, kRounds);
+    if (AtItsPrice(without) < AtItsPrice(*fit)) {
+      ++t;
+      continue;
+    }
+    *fit = std::move(without);
+    selection->accepted.erase(selection->accepted.begin() + static_cast<std::ptrdiff_t>(t));
+    t = 0;
+  }
+}
+
 // Explains the data without and, where that pays, with rest errors that moves take along. Such a
 // walk can take the place of most effects: it is a hypothesis beside them, with its price.
 Selection FindTermsOrWalk(const Templates& templates, const DiagnoseOptions& options,
@@ -87,11 +108,12 @@ Selection FindTermsOrWalk(const Templates& templates, const DiagnoseOptions& opt
   walks.noise.may_carry = true;
   SettleFit(&walks, kRounds);
   const double plain = NegativeBic(*fit);
-  if (NegativeBic(walks) - PriceOfWalk(walks) <= plain) return selection;
+  if (AtItsPrice(walks) <= plain) return selection;
   anew.noise.may_carry = true;
   SettleFit(&anew, kRounds);
   Selection again = FindTerms(templates, options, rule, &anew, &with_walk);
-  if (NegativeBic(anew) - PriceOfWalk(anew) <= plain) return selection;
+  DropWhatTheWalkTakes(&anew, &again);
+  if (AtItsPrice(anew) <= plain) return selection;
   *fit = std::move(anew);
   *diagnosis = std::move(with_walk);
   return again;

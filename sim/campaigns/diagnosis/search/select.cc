@@ -205,7 +205,7 @@ void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetG
     if ((std::min(trial.behind, trial.behind_by_likelihood) < rule.rival_behind ||
          trial.beyond_chance) &&
         std::ranges::find(*rivals, trial.cause, &Rival::cause) == rivals->end())
-      rivals->push_back({trial.cause, trial.behind, -trial.behind / 2, 0});
+      rivals->push_back({trial.cause, trial.behind, -trial.behind / 2, 0, true});
 }
 
 // Looks at each term once: exchanges it, drops it, or keeps its rivals. True if anything changed.
@@ -390,30 +390,49 @@ Selection SelectByAll(const Templates& library, const SelectionRule& rule, Fit* 
   return selection;
 }
 
-// The model's own templates, and those of their rivals' causes.
+// The model's own templates, and those of the causes that may be rivals: of terms with rivals
+// already, these. A term without them was found since, and may have any.
 Templates NearTemplates(const Templates& library, const std::vector<Accepted>& accepted,
                         const Fit& fit) {
   Templates near;
   for (const ModelTerm& term : fit.model.terms)
     if (IndexOf(near, term.form) == kNoTerm) near.push_back(term.form);
+  const bool may_be_any = accepted.size() < fit.model.terms.size();
   std::set<std::string_view> causes;
   for (const Accepted& one : accepted)
     for (const Rival& rival : one.rivals) causes.insert(rival.cause);
   for (const Template& form : library)
-    if (causes.count(form.effect->cause) != 0 && IndexOf(near, form) == kNoTerm)
+    if ((may_be_any || causes.contains(form.effect->cause)) && IndexOf(near, form) == kNoTerm)
       near.push_back(form);
   return near;
+}
+
+// Pairs of causes are tried among some units alone, as each trial is a fit. Those that did as well
+// as a term stay its rivals.
+void KeepPairs(const std::vector<ModelTerm>& terms_before, const std::vector<Accepted>& before,
+               const Fit& fit, std::vector<Accepted>* accepted) {
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
+    const Template& form = fit.model.terms[t].form;
+    std::vector<Rival>& rivals = (*accepted)[t].rivals;
+    for (std::size_t b = 0; b < before.size(); ++b) {
+      const Template& was = terms_before[b].form;
+      if (was.effect != form.effect || was.axis != form.axis) continue;
+      for (const Rival& rival : before[b].rivals)
+        if (rival.of_pair && std::ranges::find(rivals, rival.cause, &Rival::cause) == rivals.end())
+          rivals.push_back(rival);
+    }
+  }
 }
 
 }  // namespace
 
 Selection Select(const Templates& library, const SelectionRule& rule, Fit* fit) {
-  constexpr std::size_t kManyRows = 40'000, kRowsKept = 20'000;
   const Campaign& campaign = *fit->facts->campaign;
-  if (campaign.rows() <= kManyRows) return SelectByAll(library, rule, fit);
-  const std::size_t keep = campaign.units.size() * kRowsKept / campaign.rows();
+  if (campaign.rows() <= rule.rows_many) return SelectByAll(library, rule, fit);
+  const std::size_t keep = campaign.units.size() * rule.rows_kept / campaign.rows();
   Fit some = SomeUnits(*fit, keep, rule.seed);
   Selection selection = SelectByAll(library, rule, &some);
+  const std::vector<Accepted> of_some = selection.accepted;
   fit->model.terms = some.model.terms;
   for (ModelTerm& term : fit->model.terms) SpreadToAll(some, &term);
   const FleetGroups groups = GroupsOf(*fit->facts);
@@ -433,6 +452,7 @@ Selection Select(const Templates& library, const SelectionRule& rule, Fit* fit) 
   LookBook of_near(groups, false);
   TakeRivals(near, groups, rule, *fit, &of_near, &selection.accepted);
   DropTheNeedless(near, groups, rule, selection.tests, &of_near, fit, &selection.accepted);
+  KeepPairs(some.model.terms, of_some, *fit, &selection.accepted);
   return selection;
 }
 

@@ -16,9 +16,10 @@ namespace focalfleet::sim {
 
 struct Rival {
   std::string_view cause;
-  double behind = 0;    // twice the difference of the log evidence
-  double log_odds = 0;  // against the term's own cause, with the doubt of its shape
-  double share = 0;     // of the term's own signal that the rival can take over
+  double behind = 0;     // twice the difference of the log evidence
+  double log_odds = 0;   // against the term's own cause, with the doubt of its shape
+  double share = 0;      // of the term's own signal that the rival can take over
+  bool of_pair = false;  // with a cause on each axis in place of a term of both
 };
 
 struct Accepted {
@@ -33,6 +34,9 @@ struct SelectionRule {
   double rival_behind = 9;    // 2 d ln L
   // Squared cosine above which a rival is the same effect here.
   double rival_share = 0.99;
+  // Above so many rows the search is on the rows of some units, so many, and all units follow: a
+  // search costs as its rows do.
+  std::size_t rows_many = 40'000, rows_kept = 20'000;
   std::uint64_t seed = 1;
   std::function<void(std::string_view)> progress = [](std::string_view) {};
 };

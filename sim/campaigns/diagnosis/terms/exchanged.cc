@@ -6,11 +6,14 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <string>
 #include <utility>
 
+#include "protocol/base/units.h"
+#include "sim/campaigns/campaign/place_steps.h"
 #include "sim/campaigns/diagnosis/score/chances.h"
 #include "sim/campaigns/effects/other_causes.h"
 
@@ -67,6 +70,17 @@ std::vector<std::size_t> OffAtTheEnd(const Campaign& campaign) {
   return off;
 }
 
+// ln L that the exchange gains: places are about the expected ones with the spread that they have
+// about those of the exchanged names.
+double GainOf(const std::vector<double>& own_mm, const std::vector<double>& crossed_mm) {
+  const double spread_mm =
+      std::max(Median(crossed_mm) / std::sqrt(2 * std::numbers::ln2), kNoiseLeast_um / kUmPerMm);
+  double gain = 0;
+  for (const double miss_mm : own_mm) gain += MinusLogDensity(std::pow(miss_mm / spread_mm, 2));
+  for (const double miss_mm : crossed_mm) gain -= MinusLogDensity(std::pow(miss_mm / spread_mm, 2));
+  return gain;
+}
+
 // The pair of rows from which on the units are off: the change that most rows agree with.
 std::size_t SinceWhen(const Campaign& campaign, const std::vector<RowPair>& rows, std::size_t a,
                       std::size_t b) {
@@ -121,8 +135,8 @@ std::optional<CommandSwap> AsCommandSwap(const CampaignFacts& facts, std::size_t
   }
   if (own.size() < 2 * kCommonRowsMin) return std::nullopt;
   const double rms_mm = std::sqrt(square / static_cast<double>(own.size()));
-  if (Median(std::move(crossed)) >= kSwapBetter * Median(std::move(own))) return std::nullopt;
-  return CommandSwap{a, b, rows[since].exposure, rms_mm};
+  if (Median(crossed) >= kSwapBetter * Median(own)) return std::nullopt;
+  return CommandSwap{a, b, rows[since].exposure, rms_mm, GainOf(own, crossed)};
 }
 
 // The expected places of fibres by the table, and the distance from there to the measured ones.
@@ -231,8 +245,13 @@ std::optional<FibreSwap> AsFibreSwap(const CampaignFacts& facts, const Expected&
   const Campaign& campaign = *facts.campaign;
   const std::vector<RowPair> rows = RowsOfBoth(facts, a, b);
   const std::vector<char> exchanged = ExchangedIn(campaign, expected, rows);
-  FibreSwap swap{a, b, {}, 0};
-  double square = 0, seen = 0;
+  FibreSwap swap{.a = a, .b = b};
+  std::vector<double> own_mm, crossed_mm;
+  const auto take = [&](std::size_t row, std::size_t other) {
+    if (!std::isfinite(expected.own_mm[row])) return;
+    own_mm.push_back(expected.own_mm[row]);
+    crossed_mm.push_back(MissOf(campaign, expected, row, other));
+  };
   for (std::size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
     std::size_t crossed = 0;
     for (end = begin; end < rows.size() && exchanged[end] == exchanged[begin]; ++end)
@@ -244,17 +263,20 @@ std::optional<FibreSwap> AsFibreSwap(const CampaignFacts& facts, const Expected&
     if (end < rows.size()) stretch.end_a = rows[end].a, stretch.end_b = rows[end].b;
     swap.stretches.push_back(stretch);
     for (std::size_t k = begin; k < end; ++k)
-      for (const double own_mm : {expected.own_mm[rows[k].a], expected.own_mm[rows[k].b]})
-        if (std::isfinite(own_mm)) square += own_mm * own_mm, ++seen;
+      take(rows[k].a, rows[k].b), take(rows[k].b, rows[k].a);
   }
   if (swap.stretches.empty()) return std::nullopt;
-  swap.miss_mm = std::sqrt(square / seen);
+  double square = 0;
+  for (const double miss_mm : own_mm) square += miss_mm * miss_mm;
+  swap.miss_mm = std::sqrt(square / static_cast<double>(own_mm.size()));
+  swap.delta_log_likelihood = GainOf(own_mm, crossed_mm);
   return swap;
 }
 
 struct UnitPair {
   std::size_t a = 0, b = 0;
   double miss_mm = 0;
+  double delta_log_likelihood = 0;
 };
 
 CauseFound SwapCause(const Campaign& campaign, const std::vector<UnitPair>& pairs) {
@@ -269,10 +291,10 @@ CauseFound SwapCause(const Campaign& campaign, const std::vector<UnitPair>& pair
     cause.units.push_back(campaign.units[pair.a].id);
     cause.units.push_back(campaign.units[pair.b].id);
     square += pair.miss_mm * pair.miss_mm;
+    cause.delta_log_likelihood += pair.delta_log_likelihood;
   }
   cause.size_um = 1e3 * std::sqrt(square / static_cast<double>(pairs.size()));
   cause.predicted_gain_um = cause.size_um;
-  cause.delta_log_likelihood = 1e6;
   return cause;
 }
 
@@ -295,7 +317,8 @@ std::string WhileOf(const Campaign& campaign, const FibreSwap& swap) {
 
 CauseFound FibreSwapCause(const Campaign& campaign, const std::vector<FibreSwap>& swaps) {
   std::vector<UnitPair> pairs;
-  for (const FibreSwap& swap : swaps) pairs.push_back({swap.a, swap.b, swap.miss_mm});
+  for (const FibreSwap& swap : swaps)
+    pairs.push_back({swap.a, swap.b, swap.miss_mm, swap.delta_log_likelihood});
   CauseFound cause = SwapCause(campaign, pairs);
   for (const FibreSwap& swap : swaps)
     if (!IsForAll(campaign, swap))
@@ -310,7 +333,8 @@ CauseFound FibreSwapCause(const Campaign& campaign, const std::vector<FibreSwap>
 
 CauseFound CommandSwapCause(const CampaignFacts& facts, const std::vector<CommandSwap>& swaps) {
   std::vector<UnitPair> pairs;
-  for (const CommandSwap& swap : swaps) pairs.push_back({swap.a, swap.b, swap.miss_mm});
+  for (const CommandSwap& swap : swaps)
+    pairs.push_back({swap.a, swap.b, swap.miss_mm, swap.delta_log_likelihood});
   CauseFound cause = SwapCause(*facts.campaign, pairs);
   cause.shape = "each makes the other's moves, since move " +
                 std::to_string(facts.exposures.move_id[swaps.front().since]);
@@ -323,7 +347,9 @@ CauseFound CommandSwapCause(const CampaignFacts& facts, const std::vector<Comman
 
 FibreSwap FibreSwap::Whole(const Campaign& campaign, std::size_t a, std::size_t b) {
   const std::vector<std::size_t>& first_row = campaign.first_row;
-  return {a, b, {{first_row[a], first_row[a + 1], first_row[b], first_row[b + 1]}}, 0};
+  return {.a = a,
+          .b = b,
+          .stretches = {{first_row[a], first_row[a + 1], first_row[b], first_row[b + 1]}}};
 }
 
 std::vector<FibreSwap> FindFibreSwaps(const CampaignFacts& facts) {

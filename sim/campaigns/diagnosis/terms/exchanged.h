@@ -20,7 +20,8 @@ struct FibreSwap {
   };
   std::size_t a = 0, b = 0;
   std::vector<Stretch> stretches;
-  double miss_mm = 0;  // rms, of both, in these rows
+  double miss_mm = 0;               // rms, of both, in these rows
+  double delta_log_likelihood = 0;  // of the exchange, in these rows
 
   /// An exchange for all of the campaign.
   static FibreSwap Whole(const Campaign& campaign, std::size_t a, std::size_t b);
@@ -41,8 +42,9 @@ std::vector<std::size_t> RowsUnderAnothersName(const CampaignFacts& facts);
 /// Two units that make each other's moves, each from its own pose.
 struct CommandSwap {
   std::size_t a = 0, b = 0;
-  std::uint32_t since = 0;  // exposure
-  double miss_mm = 0;       // rms, of both, since then
+  std::uint32_t since = 0;          // exposure
+  double miss_mm = 0;               // rms, of both, since then
+  double delta_log_likelihood = 0;  // of the exchange
 };
 
 /// Pairs that make each other's moves by the table's geometry.

@@ -21,8 +21,7 @@ constexpr std::size_t kClusterMost = 200;  // far visits in a window
 constexpr double kTouchedLeast = 1.0 / 3;
 // Visits that decide whether arms touch at wider gaps, too.
 constexpr std::size_t kNextTouched = 12;
-constexpr double kBeyondMost = 0.1;         // of that share, of arms that are farther apart
-constexpr double kTouchLogLikelihood = 25;  // ln L of a row
+constexpr double kBeyondMost = 0.1;  // of that share, of arms that are farther apart
 constexpr std::string_view kClusterColumns[] = {kCommand[kTheta], kCommand[kPhi], kArmGap};
 constexpr double kMostRows = 0.3;  // of a unit's rows: the unit itself is named
 // Times other units' distance: the unit is named, whatever its noise.
@@ -164,6 +163,12 @@ std::vector<std::uint32_t> FarMoreThanOthers(const Fit& fit) {
   return far;
 }
 
+// The squared whitened length of a used row, without its weight.
+double SquareLength(const Fit& fit, const WhiteUnit& white, std::size_t k) {
+  const auto at = static_cast<Eigen::Index>(2 * k);
+  return white.y.segment(at, 2).squaredNorm() / fit.weight[white.track.first_row + white.moves[k]];
+}
+
 double MissSquare_um2(const Fit& fit, std::size_t row) {
   return fit.x_um[row] * fit.x_um[row] + fit.y_um[row] * fit.y_um[row];
 }
@@ -200,6 +205,26 @@ std::vector<std::size_t> TouchedRows(const Fit& fit, const std::vector<Visit>& v
   for (const std::size_t row : far)
     if (side[row] != 0 && gap_mm[row] <= touching_mm) rows.push_back(row);
   return rows;
+}
+
+// ln L that these rows lose by being where they are in place of where they should be. `rows`
+// ascend.
+double LostIn(const Fit& fit, const std::vector<std::size_t>& rows) {
+  double lost = 0;
+  auto next = rows.begin();
+  for (std::size_t unit = 0; next != rows.end(); ++unit) {
+    if (*next >= fit.facts->campaign->first_row[unit + 1]) continue;
+    const WhiteUnit white = Whiten(fit, unit);
+    for (std::size_t k = 0; k < white.moves.size() && next != rows.end(); ++k) {
+      const std::size_t row = white.track.first_row + white.moves[k];
+      while (next != rows.end() && *next < row) ++next;
+      if (next == rows.end() || *next != row) continue;
+      lost += MinusLogDensity(SquareLength(fit, white, k));
+      ++next;
+    }
+    next = std::ranges::lower_bound(next, rows.end(), fit.facts->campaign->first_row[unit + 1]);
+  }
+  return lost;
 }
 
 }  // namespace
@@ -251,9 +276,7 @@ std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found) {
     std::size_t far = 0;
     for (std::size_t k = 0; k < white.moves.size(); ++k) {
       const std::size_t row = white.track.first_row + white.moves[k];
-      const auto at = static_cast<Eigen::Index>(2 * k);
-      const double length = std::hypot(white.y[at], white.y[at + 1]) / std::sqrt(fit.weight[row]);
-      if (length <= kFarWhitened) continue;
+      if (SquareLength(fit, white, k) <= kFarWhitened * kFarWhitened) continue;
       ++far;
       far_rows.push_back(row);
       ++found->rows;
@@ -315,7 +338,7 @@ CauseFound TouchCause(const Fit& fit, const std::vector<std::size_t>& rows) {
   cause.amplitude = static_cast<double>(exposures.size());
   cause.ci95[0] = cause.ci95[1] = cause.amplitude;
   cause.size_um = std::sqrt(square / static_cast<double>(rows.size()));
-  cause.delta_log_likelihood = kTouchLogLikelihood * static_cast<double>(rows.size());
+  cause.delta_log_likelihood = LostIn(fit, rows);
   cause.paragraph =
       "Where arms come nearest to each other their fibres are far from their place, in these moves "
       "alone: they have touched. Look at the arms, and at the plans of these moves.";

@@ -29,14 +29,18 @@ struct SeenTurn {
   double asked_deg = 0, made_deg = 0, at_deg = 0;
 };
 
+/// Below this a turn is none.
+double StallOf_deg(const SeenTurn& turn) {
+  return std::min(kStallShare * std::abs(turn.asked_deg), kLong_deg);
+}
+
 // The share of what they were asked that moves of one direction made: the line through zero from
 // which their turns are off by the least sum of distances. Long moves tell it best.
 std::optional<double> ScaleOf(const std::vector<SeenTurn>& turns, double sign) {
   std::vector<std::pair<double, double>> shares;  // with the angles asked
   double all = 0;
   for (const SeenTurn& turn : turns)
-    if (turn.asked_deg * sign >= kLong_deg &&
-        std::abs(turn.made_deg) >= kStallShare * turn.asked_deg * sign)
+    if (turn.asked_deg * sign >= kLong_deg && std::abs(turn.made_deg) >= StallOf_deg(turn))
       shares.emplace_back(turn.made_deg / turn.asked_deg, std::abs(turn.asked_deg)),
           all += std::abs(turn.asked_deg);
   if (shares.empty()) return std::nullopt;
@@ -129,11 +133,6 @@ class Turns {
   double square_sum_ = 0;
   std::size_t rows_ = 0;
 };
-
-/// Below this a turn is none.
-double StallOf_deg(const SeenTurn& turn) {
-  return std::min(kStallShare * std::abs(turn.asked_deg), kLong_deg);
-}
 
 /// Whole turns end at the place where they began, as an axis does that does not turn at all. Such a
 /// move is no evidence of either.

@@ -28,6 +28,7 @@ TEST(BothAxes, PlayOfBothIsNoDroop) {
     for (const std::uint64_t seed : {3u, 4u}) {
       SCOPED_TRACE(testing::Message() << play_deg << " deg, seed " << seed);
       const Diagnosis diagnosis = Verdicts(PlayOfBothAxes(play_deg, seed));
+      EXPECT_TRUE(play_deg < 0.01 || !diagnosis.causes.empty()) << Reported(diagnosis);
       for (const CauseFound& cause : diagnosis.causes) {
         if (play_deg > 0.01) {
           EXPECT_THAT(cause.candidates, testing::Contains("backlash")) << Reported(diagnosis);

@@ -26,7 +26,7 @@ TEST(Lanes, EachIsWhitenedAsIfItWereAlone) {
     WhiteDisplacement(white, errors, alone.data());
     std::vector<Lanes> rows(alone.size());
     for (const std::size_t lane : {0u, 5u}) PutDisplacement(white, errors, lane, rows.data());
-    WhitenLanes(white, rows.data());
+    WhitenLanes(white.filter, white.turn_um.data(), rows.data(), rows.data());
     for (std::size_t r = 0; r < alone.size(); ++r) {
       EXPECT_EQ(rows[r].at[0], alone[r]) << cause;
       EXPECT_EQ(rows[r].at[5], alone[r]) << cause;
@@ -50,6 +50,22 @@ TEST(Lanes, ColumnsAreTakenOffEach) {
     for (std::size_t j = 0; j < kLanes; ++j)
       EXPECT_NEAR(left[static_cast<std::size_t>(r)].at[j], wanted(r, static_cast<Eigen::Index>(j)),
                   1e-14);
+}
+
+TEST(Lanes, BlocksAreMultipliedLaneByLane) {
+  const Eigen::MatrixXd plain = Eigen::MatrixXd::Random(30, 2 * kLanes);
+  std::vector<Lanes> a(30), b(30);
+  for (Eigen::Index r = 0; r < 30; ++r)
+    for (std::size_t j = 0; j < kLanes; ++j) {
+      a[static_cast<std::size_t>(r)].at[j] = plain(r, static_cast<Eigen::Index>(j));
+      b[static_cast<std::size_t>(r)].at[j] = plain(r, static_cast<Eigen::Index>(kLanes + j));
+    }
+  const Eigen::MatrixXd wanted = plain.leftCols(kLanes).transpose() * plain.rightCols(kLanes);
+  const LaneProducts products = MultiplyBlocks(a.data(), b.data(), a.size());
+  for (std::size_t i = 0; i < kLanes; ++i)
+    for (std::size_t j = 0; j < kLanes; ++j)
+      EXPECT_NEAR(products[i].at[j],
+                  wanted(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)), 1e-13);
 }
 
 TEST(Lanes, AlikeNeighboursSumAsInOneColumn) {

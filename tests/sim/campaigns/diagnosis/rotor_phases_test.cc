@@ -14,35 +14,13 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::kPull_deg;
 using test::Planted;
+using test::Pulled;
+using test::RandomPhases_deg;
 using test::Reported;
 using test::StaticFit;
-using test::TurnTheta;
 using test::Verdicts;
-
-constexpr double kPull_deg = 0.03;
-
-std::vector<double> RandomPhases_deg(std::size_t units, std::uint64_t seed) {
-  Rng rng = Rng::Stream(seed, "rotors");
-  std::vector<double> phases(units);
-  for (double& phase : phases) phase = rng.Uniform(0, 360);
-  return phases;
-}
-
-// Each theta motor is pulled by its neighbours', whose rotors stand at these angles.
-Campaign Pulled(const std::vector<double>& phases_deg, std::uint64_t seed) {
-  Campaign campaign = Planted({}, {.units = phases_deg.size(), .moves = 60, .seed = seed});
-  const CampaignFacts facts = MakeFacts(campaign);
-  std::vector<double> off_deg(campaign.rows(), 0);
-  for (std::size_t u = 0; u < phases_deg.size(); ++u)
-    for (const std::size_t v : facts.neighbours[u])
-      for (const PullingPair& pair : PullOf(facts, u, v, kTheta))
-        off_deg[pair.row] +=
-            kPull_deg * pair.nearness *
-            std::sin(pair.angle_rad + kRadiansPerDegree * (phases_deg[u] - phases_deg[v]));
-  TurnTheta([&](std::size_t row) { return off_deg[row]; }, &campaign);
-  return campaign;
-}
 
 double Apart_deg(double a_deg, double b_deg) {
   return std::abs(std::remainder(a_deg - b_deg, 360));

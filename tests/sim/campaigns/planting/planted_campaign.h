@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "protocol/base/rng.h"
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/decide/diagnosis.h"
 #include "sim/campaigns/diagnosis/model/fit.h"
 #include "sim/campaigns/planting/planted.h"
@@ -64,6 +65,31 @@ inline Campaign Damp(std::uint64_t seed) {
   TurnTheta([&](std::size_t row) { return 0.12 * std::pow((column.values[row] - 20) / 70, 2); },
             &campaign);
   campaign.covariates.push_back(std::move(column));
+  return campaign;
+}
+
+inline constexpr double kPull_deg = 0.03;
+
+/// Angles of rotors, anywhere.
+inline std::vector<double> RandomPhases_deg(std::size_t units, std::uint64_t seed) {
+  Rng rng = Rng::Stream(seed, "rotors");
+  std::vector<double> phases(units);
+  for (double& phase : phases) phase = rng.Uniform(0, 360);
+  return phases;
+}
+
+/// Each theta motor is pulled by its neighbours', whose rotors stand at these angles.
+inline Campaign Pulled(const std::vector<double>& phases_deg, std::uint64_t seed) {
+  Campaign campaign = Planted({}, {.units = phases_deg.size(), .moves = 60, .seed = seed});
+  const CampaignFacts facts = MakeFacts(campaign);
+  std::vector<double> off_deg(campaign.rows(), 0);
+  for (std::size_t u = 0; u < phases_deg.size(); ++u)
+    for (const std::size_t v : facts.neighbours[u])
+      for (const PullingPair& pair : PullOf(facts, u, v, kTheta))
+        off_deg[pair.row] +=
+            kPull_deg * pair.nearness *
+            std::sin(pair.angle_rad + kRadiansPerDegree * (phases_deg[u] - phases_deg[v]));
+  TurnTheta([&](std::size_t row) { return off_deg[row]; }, &campaign);
   return campaign;
 }
 
