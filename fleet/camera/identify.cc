@@ -283,6 +283,29 @@ bool IsOtherField(const Claims& claims, const IdentifyOptions& options) {
          claims.stray_spots > std::max(claims.recognised, kStrayFibresMin);
 }
 
+// P(at least `count`) of a Poisson distribution.
+double PoissonTail(double mean, std::size_t count) {
+  double term = std::exp(-mean), below = 0;
+  for (std::size_t k = 0; k < count; ++k) below += term, term *= mean / static_cast<double>(k + 1);
+  return 1 - below;
+}
+
+// Lost units may be anywhere, and are found in any picture. Where too few units at known places
+// vouch for it, more dark units and spots of no unit than dark fibres and dust make tell another
+// field.
+bool MayBeOtherField(const Claims& claims, const IdentifyOptions& options,
+                     const Identification& found) {
+  // Each is where it should be within some hundredths of a millimetre: by chance one in thousands.
+  constexpr std::size_t kWitnessesMin = 3;
+  if (claims.recognised >= std::min(kWitnessesMin, found.units.size() / 2)) return false;
+  const std::size_t odd = found.unexplained.size() +
+                          found.count[static_cast<std::size_t>(MeasurementStatus::kMissing)] +
+                          found.count[static_cast<std::size_t>(MeasurementStatus::kOutsidePatrol)];
+  const double usual =
+      (options.shares.missing + options.shares.dust) * static_cast<double>(found.units.size());
+  return PoissonTail(usual, odd) < options.doubt_max;
+}
+
 std::optional<Refusal> Implausible(const IdentificationRequest& request,
                                    const IdentifyOptions& options) {
   const auto lights = static_cast<double>(request.layout->size() + request.fiducials.size());
@@ -374,7 +397,13 @@ tl::expected<Identification, Refusal> Identify(const IdentificationRequest& requ
              std::to_string(looked->claims.units) +
              " units are where they ended or were before: another field, or another plate"});
   }
-  Matching(request, options, looked->spots, looked->grid, std::move(looked->claims)).Run(&result);
+  Matching(request, options, looked->spots, looked->grid, looked->claims).Run(&result);
+  if (MayBeOtherField(looked->claims, options, result))
+    return tl::unexpected<Refusal>(
+        {RefusalReason::kOtherField, std::to_string(looked->claims.recognised) +
+                                         " units of known place are there, and " +
+                                         std::to_string(result.unexplained.size()) +
+                                         " spots of no unit: another field, or another plate"});
   result.spots_fp = std::move(looked->spots.at_fp);
   return result;
 }

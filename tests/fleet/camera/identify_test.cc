@@ -402,6 +402,19 @@ TEST_F(Identify, AnotherFieldIsRefused) {
   EXPECT_EQ(RefusedAs(), "other_field");
 }
 
+// Units that may be anywhere stand in any field.
+TEST_F(Identify, AnotherFieldIsRefusedWhereAllUnitsAreLost) {
+  field_.Move(kNoTroubles);
+  std::vector<UnitExpectation> lost = field_.Expectations();
+  for (UnitExpectation& one : lost) one.lost = true, one.before_fp.reset(), one.before.reset();
+  Picture(field_.Sources());
+  EXPECT_TRUE(Ask(lost)) << "their own field";
+  auto sources = field_.Sources();
+  for (std::size_t k = 3; k < 217; ++k) sources[k].place_mm += Complex(8, -5);
+  Picture(sources);
+  EXPECT_STREQ(Ask(lost) ? "" : Name(Ask(lost).error().reason), "other_field");
+}
+
 TEST_F(Identify, AnotherPlateIsRefused) {
   CameraField other({.count = 217, .pitch_mm = 24, .fiducials = 24}, 3);
   field_.Move(kNoTroubles);
