@@ -78,7 +78,7 @@ Result<OpenedInterface> OpenInterface(const std::string& name, const Listening& 
     ::close(fd);
     return tl::unexpected<Error>(std::move(error));
   };
-  const auto link = LookAtLinkInTime(name);
+  const auto link = listening.may_wait ? LookAtLink(name) : LookAtLinkInTime(name);
   if (!link) return give_up(link.error());
   if (!link->up) {
     ::close(fd);

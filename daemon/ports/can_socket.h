@@ -19,7 +19,8 @@ enum class Hears : std::uint8_t { kUnits, kHosts };
 
 struct Listening {
   Hears hears = Hears::kUnits;
-  bool groups = false;  // CAN FD frames pass in both directions
+  bool groups = false;    // CAN FD frames pass in both directions
+  bool may_wait = false;  // for the kernel: nothing else runs yet
 };
 
 struct OpenedInterface {

@@ -87,15 +87,15 @@ SocketCanPort::SocketCanPort(Options options, WatchedSocket socket)
 Result<std::unique_ptr<SocketCanPort>> SocketCanPort::Create(Options options) {
   FOCALFLEET_TRY_ASSIGN(WatchedSocket socket, WatchedSocket::Create());
   std::unique_ptr<SocketCanPort> port(new SocketCanPort(std::move(options), std::move(socket)));
-  const auto opened = port->Open();
+  const auto opened = port->Open(true);
   if (!opened && opened.error().code != ErrorCode::kUnavailable)
     return tl::unexpected<Error>(opened.error());
   return port;
 }
 
-Status SocketCanPort::Open() {
+Status SocketCanPort::Open(bool may_wait) {
   aside_.stamps.emplace(options_.wall_ahead);
-  auto opened = options_.open(options_.interface, {options_.hears, aside_.groups});
+  auto opened = options_.open(options_.interface, {options_.hears, aside_.groups, may_wait});
   found_ = opened.has_value();
   if (!opened) {
     trouble_ = opened.error().text;
@@ -226,7 +226,7 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
     if (std::exchange(lost_unreported_, false))
       retry_at_ = now + options_.clock.Real(options_.retry_period);
     if (now < retry_at_) return;
-    static_cast<void>(Open());  // the trouble is what failed
+    static_cast<void>(Open(false));  // the trouble is what failed
     if (!socket_.open()) {
       retry_at_ = now + options_.clock.Real(options_.retry_period);
       return;

@@ -69,7 +69,7 @@ class SocketCanPort : public PollablePort {
 
  private:
   SocketCanPort(Options options, WatchedSocket socket);
-  Status Open();
+  Status Open(bool may_wait);
   void Lose(const std::string& why);
   void NoteError(const can_frame& error, HostInstant now);
   void SetState(LinkState state, HostInstant now);

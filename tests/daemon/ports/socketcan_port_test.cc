@@ -57,10 +57,14 @@ struct Interface {
 
 TEST(SocketCanPort, FindsAnInterfaceThatComesLaterAndCountsOnlyTheNextTimes) {
   Interface interface;
-  const auto port = SocketCanPort::Create(
-      {.bus = BusId{1},
-       .interface = "can7",
-       .open = [&](const std::string& name, const Listening&) { return interface.Open(name); }});
+  std::vector<bool> waits;  // for a busy kernel: at the start alone, which it must not spoil
+  const auto port =
+      SocketCanPort::Create({.bus = BusId{1},
+                             .interface = "can7",
+                             .open = [&](const std::string& name, const Listening& listening) {
+                               waits.push_back(listening.may_wait);
+                               return interface.Open(name);
+                             }});
   ASSERT_TRUE(port) << port.error().text;
   EXPECT_EQ((*port)->trouble(), "no CAN interface 'can7'");
   std::vector<ReceivedFrame> in;
@@ -81,6 +85,7 @@ TEST(SocketCanPort, FindsAnInterfaceThatComesLaterAndCountsOnlyTheNextTimes) {
   EXPECT_EQ(receive_at(1400), LinkState::kUp);
   EXPECT_EQ((*port)->trouble(), "");
   EXPECT_EQ((*port)->counters().reconnects, 0u) << "the first time it came up";
+  EXPECT_EQ(waits, (std::vector<bool>{true, false, false, false}));
   // The other end is closed, so sending is refused.
   ::shutdown(interface.ends[0], SHUT_RDWR);
   const CanFrame frame{.id = 77, .length = 0, .data = {}};
