@@ -293,17 +293,22 @@ double PoissonTail(double mean, std::size_t count) {
 // Lost units may be anywhere, and are found in any picture. Where too few units at known places
 // vouch for it, more dark units and spots of no unit than dark fibres and dust make tell another
 // field.
-bool MayBeOtherField(const Claims& claims, const IdentifyOptions& options,
-                     const Identification& found) {
+std::optional<Refusal> PerhapsOtherField(std::uint32_t recognised, const IdentifyOptions& options,
+                                         const Identification& found) {
   // Each is where it should be within some hundredths of a millimetre: by chance one in thousands.
   constexpr std::size_t kWitnessesMin = 3;
-  if (claims.recognised >= std::min(kWitnessesMin, found.units.size() / 2)) return false;
-  const std::size_t odd = found.unexplained.size() +
-                          found.count[static_cast<std::size_t>(MeasurementStatus::kMissing)] +
-                          found.count[static_cast<std::size_t>(MeasurementStatus::kOutsidePatrol)];
+  if (recognised >= std::min(kWitnessesMin, found.units.size() / 2)) return std::nullopt;
+  const std::size_t dark = found.count[static_cast<std::size_t>(MeasurementStatus::kMissing)] +
+                           found.count[static_cast<std::size_t>(MeasurementStatus::kOutsidePatrol)];
   const double usual =
       (options.shares.missing + options.shares.dust) * static_cast<double>(found.units.size());
-  return PoissonTail(usual, odd) < options.doubt_max;
+  if (PoissonTail(usual, dark + found.unexplained.size()) >= options.doubt_max) return std::nullopt;
+  return Refusal{RefusalReason::kOtherField,
+                 "fiducials are in place, but " + std::to_string(found.unexplained.size()) +
+                     " spots are of no unit and " + std::to_string(dark) + " of " +
+                     std::to_string(found.units.size()) +
+                     " units have no spot, and most places were not known before: another field, "
+                     "or another plate"};
 }
 
 std::optional<Refusal> Implausible(const IdentificationRequest& request,
@@ -397,13 +402,10 @@ tl::expected<Identification, Refusal> Identify(const IdentificationRequest& requ
              std::to_string(looked->claims.units) +
              " units are where they ended or were before: another field, or another plate"});
   }
-  Matching(request, options, looked->spots, looked->grid, looked->claims).Run(&result);
-  if (MayBeOtherField(looked->claims, options, result))
-    return tl::unexpected<Refusal>(
-        {RefusalReason::kOtherField, std::to_string(looked->claims.recognised) +
-                                         " units of known place are there, and " +
-                                         std::to_string(result.unexplained.size()) +
-                                         " spots of no unit: another field, or another plate"});
+  const std::uint32_t recognised = looked->claims.recognised;
+  Matching(request, options, looked->spots, looked->grid, std::move(looked->claims)).Run(&result);
+  if (auto other = PerhapsOtherField(recognised, options, result))
+    return tl::unexpected<Refusal>(std::move(*other));
   result.spots_fp = std::move(looked->spots.at_fp);
   return result;
 }
