@@ -51,13 +51,15 @@ Status Life::Open() {
       LineHall::Hooks{.urgent = &RequestHandler::IsStop, .out = around_.out});
   hall_ = hall.get();
   handler_ = std::make_unique<RequestHandler>(
-      std::move(hall), RequestHandler::Options{.facts = [this] { return Facts(); },
-                                               .log = around_.log,
-                                               .store_path = kStorePath,
-                                               .store = OptionsOf(*around_.disk),
-                                               .models = models_.get(),
-                                               .alarms = &alarms_,
-                                               .audit = &audit_});
+      std::move(hall),
+      RequestHandler::Options{.facts = [this] { return Facts(); },
+                              .log = around_.log,
+                              .store_path = kStorePath,
+                              .store = OptionsOf(*around_.disk),
+                              .models = models_.get(),
+                              .alarms = &alarms_,
+                              .audit = &audit_,
+                              .room_for_rows = [this] { return writer_->RoomForRows(); }});
   const auto restored = [&]() -> Status {
     FOCALFLEET_TRY_ASSIGN(const auto reader,
                           StoreReader::Open(kStorePath, OptionsOf(*around_.disk)));

@@ -1,12 +1,12 @@
 // Lines of seeds: what a killed task leaves behind, seeds that ran twice, and the table of all.
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <fstream>
 #include <string>
 
 #include "daemon/soak/campaign.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet::soak {
 namespace {
@@ -60,17 +60,11 @@ TEST(SoakSummary, TwoRunsOfOneProgramMustNotDiffer) {
 
 class SoakFolder : public testing::Test {
  protected:
-  SoakFolder() {
-    char name[] = "/tmp/focalfleet-soak-XXXXXX";
-    folder_ = mkdtemp(name);
-  }
-  ~SoakFolder() override { std::filesystem::remove_all(folder_); }
-
   void Append(const std::string& file, const std::string& text) const {
-    std::ofstream(folder_ + "/" + file, std::ios::app) << text;
+    std::ofstream(scratch_ / file, std::ios::app) << text;
   }
   [[nodiscard]] Summary Merged(const SeedRange& seeds) const {
-    auto merged = MergeFolder(folder_, seeds);
+    auto merged = MergeFolder(scratch_.path(), seeds);
     EXPECT_TRUE(merged) << merged.error().text;
     return merged ? std::move(*merged) : Summary();
   }
@@ -78,12 +72,12 @@ class SoakFolder : public testing::Test {
     return RunCampaign({.seeds = {seed, seed},
                         .minutes = {},
                         .units = 2,
-                        .json_folder = folder_,
+                        .json_folder = scratch_.path(),
                         .print = [](const std::string&) {}})
         .has_value();
   }
 
-  std::string folder_;
+  test::ScratchFolder scratch_;
 };
 
 TEST_F(SoakFolder, ASeedWhoseLineWasCutRunsAgain) {
@@ -93,7 +87,7 @@ TEST_F(SoakFolder, ASeedWhoseLineWasCutRunsAgain) {
     EXPECT_FALSE(Merged({1, 9}).has(9));
     ASSERT_TRUE(RunsAgain(9));
     EXPECT_TRUE(Merged({1, 9}).has(9));
-    std::filesystem::remove(folder_ + "/seeds-9-9.jsonl");
+    std::filesystem::remove(scratch_ / "seeds-9-9.jsonl");
   }
 }
 
@@ -114,7 +108,7 @@ TEST_F(SoakFolder, LinesOfOtherSeedsCountForNothing) {
 
 TEST_F(SoakFolder, AFileThatIsNoListOfSeedsIsRefused) {
   Append("other.jsonl", "seed 3 passed\n");
-  EXPECT_FALSE(MergeFolder(folder_, {1, 9}));
+  EXPECT_FALSE(MergeFolder(scratch_.path(), {1, 9}));
 }
 
 }  // namespace
