@@ -10,7 +10,7 @@
 
 #include "daemon/report/plate_plot.h"
 #include "daemon/report/ticks.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 
 namespace focalfleet {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "protocol/base/rng.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <optional>
 
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 
 namespace focalfleet::sim {
 namespace {

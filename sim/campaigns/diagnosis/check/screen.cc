@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/term_trace.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 #include "sim/campaigns/diagnosis/search/select.h"
 #include "sim/campaigns/effects/empirical.h"
 

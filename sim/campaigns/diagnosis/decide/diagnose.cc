@@ -18,9 +18,9 @@
 #include "sim/campaigns/diagnosis/decide/name_causes.h"
 #include "sim/campaigns/diagnosis/decide/remarks.h"
 #include "sim/campaigns/diagnosis/design/next_moves.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/discrepancy.h"
 #include "sim/campaigns/diagnosis/model/plain_geometry.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 #include "sim/campaigns/diagnosis/search/beaten.h"
 #include "sim/campaigns/diagnosis/search/find_model.h"
 #include "sim/campaigns/diagnosis/search/rotors.h"
@@ -170,8 +170,7 @@ double ShareBeyondReach(const Fit& fit) {
 
 // The part that the given model already explains is no misfit. Its effects are subtracted from the
 // measured places, and its geometry replaces the table's. The coordinator has closed its loop by
-// the geometry that it had.
-// Returns the displacements that were subtracted.
+// the geometry that it had. Returns the displacements that were subtracted.
 Places TakeAway(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel,
                 Campaign* campaign) {
   campaign->coordinator_units = std::move(campaign->units);

@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 
 #include <algorithm>
 #include <cmath>

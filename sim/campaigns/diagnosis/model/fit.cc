@@ -3,10 +3,10 @@
 #include <cmath>
 
 #include "protocol/base/units.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/discrepancy.h"
 #include "sim/campaigns/diagnosis/model/far_angles.h"
 #include "sim/campaigns/diagnosis/model/plain_geometry.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -1,4 +1,4 @@
-#include "sim/campaigns/diagnosis/score/lanes.h"
+#include "sim/campaigns/diagnosis/model/lanes.h"
 
 #include <algorithm>
 #include <bit>
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "protocol/base/units.h"
-#include "sim/campaigns/diagnosis/score/neighbour_sum.h"
+#include "sim/campaigns/diagnosis/model/neighbour_sum.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -20,8 +20,8 @@ using Four = FourOf::Numbers;
 constexpr std::size_t kFours = sizeof(Lanes) / sizeof(Four);
 
 // Makes a second version of a function, for machines with wide registers. Both do the same
-// operations on each lane, and none of them is fused: the results are the same. Sanitizers run
-// before the loader can choose.
+// operations on each lane, and none of them is fused: the results are the same. The loader chooses
+// before a sanitizer is ready, so that those builds have one version.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define FOCALFLEET_ALSO_WIDE [[gnu::target_clones("avx2", "default")]]

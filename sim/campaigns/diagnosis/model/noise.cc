@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/fit.h"
 #include "sim/campaigns/diagnosis/model/noise_cost.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 
 namespace focalfleet::sim {
 namespace {

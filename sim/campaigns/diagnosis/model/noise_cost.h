@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "sim/campaigns/diagnosis/model/fit.h"
-#include "sim/campaigns/diagnosis/score/lanes.h"
+#include "sim/campaigns/diagnosis/model/lanes.h"
 
 namespace focalfleet::sim {
 

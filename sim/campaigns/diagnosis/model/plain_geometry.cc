@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "protocol/base/units.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/static_geometry.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 
 namespace focalfleet::sim {
 namespace {

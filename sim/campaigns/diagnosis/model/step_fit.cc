@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/discrepancy.h"
 #include "sim/campaigns/diagnosis/model/fit.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 
 namespace focalfleet::sim {
 namespace {

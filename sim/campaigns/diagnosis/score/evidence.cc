@@ -8,8 +8,8 @@
 #include <span>
 
 #include "protocol/base/rng.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
-#include "sim/campaigns/diagnosis/score/neighbour_sum.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
+#include "sim/campaigns/diagnosis/model/neighbour_sum.h"
 
 namespace focalfleet::sim {
 namespace {

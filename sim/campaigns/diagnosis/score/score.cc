@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/campaigns/diagnosis/model/lanes.h"
+#include "sim/campaigns/diagnosis/model/neighbour_sum.h"
 #include "sim/campaigns/diagnosis/score/fleet_sums.h"
-#include "sim/campaigns/diagnosis/score/lanes.h"
-#include "sim/campaigns/diagnosis/score/neighbour_sum.h"
 #include "sim/campaigns/diagnosis/score/unit_scorer.h"
 
 namespace focalfleet::sim {

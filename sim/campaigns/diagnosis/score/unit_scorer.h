@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "sim/campaigns/diagnosis/score/lanes.h"
+#include "sim/campaigns/diagnosis/model/lanes.h"
 #include "sim/campaigns/diagnosis/score/score.h"
 
 namespace focalfleet::sim {

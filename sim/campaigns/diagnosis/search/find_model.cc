@@ -80,12 +80,10 @@ double AtItsPrice(const Fit& walk) { return NegativeBic(walk) - PriceOfWalk(walk
 // Drops terms that a walk explains as well once they are gone. Beside such a term the walk's noise
 // is fitted to what the term leaves, and the term's evidence is by that noise.
 void DropWhatTheWalkTakes(Fit* fit, Selection* selection) {
-  constexpr int kRounds = 3;
   for (std::size_t t = 0; t < fit->model.terms.size();) {
     Fit without = *fit;
     without.model.terms.erase(without.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
-    StepFit(&without);
-    SettleFit(&without, kRounds);
+    FitAnew(&without);
     if (AtItsPrice(without) < AtItsPrice(*fit)) {
       ++t;
       continue;

@@ -7,7 +7,7 @@
 #include <unsupported/Eigen/FFT>
 
 #include "sim/campaigns/diagnosis/model/angle_errors.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet::sim {

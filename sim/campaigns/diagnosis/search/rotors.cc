@@ -8,8 +8,8 @@
 
 #include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/model/angle_errors.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/term_trace.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 #include "sim/campaigns/effects/harmonic.h"
 #include "sim/campaigns/effects/registry.h"
 #include "sim/campaigns/effects/rotor_ways.h"

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <tuple>
 
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/term_trace.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 #include "sim/campaigns/diagnosis/search/both_axes.h"
 #include "sim/campaigns/diagnosis/search/candidate_shapes.h"
 #include "sim/campaigns/diagnosis/search/quick_look.h"

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <set>
 
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/terms/exact_steps.h"
 #include "sim/campaigns/diagnosis/terms/slips.h"
 

@@ -7,8 +7,8 @@
 #include <span>
 
 #include "protocol/base/units.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/plain_geometry.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -14,7 +14,7 @@
 
 #include "protocol/base/units.h"
 #include "sim/campaigns/campaign/place_steps.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {

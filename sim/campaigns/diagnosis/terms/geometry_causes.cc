@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "protocol/base/units.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/effects/other_causes.h"
 
 namespace focalfleet::sim {

@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "protocol/base/units.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/term_trace.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 #include "sim/campaigns/diagnosis/terms/image_followed.h"
 #include "sim/campaigns/effects/other_causes.h"
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <set>
 
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/terms/events.h"
 
 namespace focalfleet::sim {

@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 
 namespace focalfleet::sim {
 namespace {

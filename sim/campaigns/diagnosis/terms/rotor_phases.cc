@@ -7,7 +7,7 @@
 
 #include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/model/angle_errors.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 
 namespace focalfleet::sim {
 namespace {

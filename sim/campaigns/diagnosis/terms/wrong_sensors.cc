@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/score/fleet_groups.h"
 
 namespace focalfleet::sim {

@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "protocol/base/units.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/far_angles.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "protocol/base/rng.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/plain_geometry.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
 #include "sim/campaigns/diagnosis/terms/outliers.h"
 #include "sim/campaigns/effects/empirical.h"
 

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "sim/campaigns/diagnosis/model/angle_errors.h"
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 
 namespace focalfleet::sim {
 namespace {

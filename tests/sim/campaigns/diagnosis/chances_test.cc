@@ -1,5 +1,5 @@
 // Numbers of chance that names are judged by are compared with those by hand.
-#include "sim/campaigns/diagnosis/score/chances.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
 // Columns side by side give the same result as each alone.
-#include "sim/campaigns/diagnosis/score/lanes.h"
+#include "sim/campaigns/diagnosis/model/lanes.h"
 
 #include "sim/campaigns/diagnosis/model/fit.h"
-#include "sim/campaigns/diagnosis/score/neighbour_sum.h"
+#include "sim/campaigns/diagnosis/model/neighbour_sum.h"
 #include "sim/campaigns/effects/registry.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
 
