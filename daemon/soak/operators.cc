@@ -73,6 +73,8 @@ std::uint64_t Operators::Ask(const std::string& verb, Json args) {
   if (args.contains("unit_id")) open_[client].unit = UnitId{args["unit_id"].get<std::uint32_t>()};
   if (args.contains("unit_ids") && args["unit_ids"].size() == 1)
     open_[client].unit = UnitId{args["unit_ids"][0].get<std::uint32_t>()};
+  if (open_[client].unit && (verb == "enable" || verb == "disable"))
+    newest_change_[open_[client].unit->value] = client;
   if (verb == "apply" || verb == "home" || verb == "retarget" || verb == "measure")
     parts_.judge->stops().MotionCommanded(HostInstant{ReadVirtualNs()});
   if (verb == "stop")
@@ -205,7 +207,7 @@ bool Operators::Hear(std::uint64_t client, std::string_view line, bool last) {
   if (!answer) {
     parts_.judge->Broken("answer", "a line that is no answer: " + answer.error().text);
   } else {
-    CheckAnswer(found->second, *answer);
+    CheckAnswer(client, found->second, *answer);
     if (answers_.size() >= kAnswersKept) answers_.erase(answers_.begin());
     answers_[client] = std::move(*answer);
   }
@@ -213,13 +215,15 @@ bool Operators::Hear(std::uint64_t client, std::string_view line, bool last) {
   return true;
 }
 
-/// A change that is answered with success is in the store.
-void Operators::CheckAnswer(const Open& open, const ControlAnswer& answer) {
+/// A change that is answered with success is in the store. Somebody else may ask for the opposite
+/// before the answer comes, as when the host stood still: one commit then has both.
+void Operators::CheckAnswer(std::uint64_t client, const Open& open, const ControlAnswer& answer) {
   if (answer.kind != ControlAnswer::Kind::kResult) return;
   if (open.verb == "stop" && !open.unit)
     parts_.judge->stops().AllStopped(open.asked, HostInstant{ReadVirtualNs()});
   if (!open.unit) return;
   if (open.verb != "enable" && open.verb != "disable") return;
+  if (newest_change_[open.unit->value] != client) return;
   const auto& units = parts_.judge->acknowledged().units;
   const auto unit = units.find(open.unit->value);
   const bool enabled = unit == units.end() || unit->second.enabled;

@@ -70,7 +70,7 @@ class Operators {
   Json OneUnit(UnitId* unit);
   void ChangeModel();
   void ActAtRandom();
-  void CheckAnswer(const Open& open, const ControlAnswer& answer);
+  void CheckAnswer(std::uint64_t client, const Open& open, const ControlAnswer& answer);
 
   Parts parts_;
   Rng rng_;
@@ -78,6 +78,7 @@ class Operators {
   HostInstant next_;
   std::uint64_t client_ = 0;
   std::map<std::uint64_t, Open> open_;
+  std::map<std::uint32_t, std::uint64_t> newest_change_;  // the request to enable or disable a unit
   std::map<std::uint64_t, ControlAnswer> answers_;
   std::uint64_t answered_ = 0;
   std::uint64_t digest_ = 0xcbf29ce484222325u;

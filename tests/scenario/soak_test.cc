@@ -83,6 +83,9 @@ TEST(Regression, Seed426_AFollowerThatIsNotHeardIsStopped) {
   ExpectKept(426, RunSeed(426, 0, DrawKinds::kPower));
 }
 
+// Somebody disables a unit that another has just enabled: both are answered after one commit.
+TEST(Regression, Seed40049_TwoWhoDisagreeAreBothAnsweredTruly) { ExpectKept(40049); }
+
 // The judge's own parts must be able to see what they look for.
 
 StoreOptions On(const MemoryDisk& disk) { return {.vfs = disk.name(), .vfs_has_files = true}; }

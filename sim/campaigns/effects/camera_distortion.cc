@@ -13,6 +13,8 @@ void ListCameraDistortion(const CampaignFacts& facts, Templates* out) {
                   .form = 2,
                   .label = "radial of third and fifth order, decentred, trefoil"});
   out->push_back({.axis = EffectAxis::kNone, .columns = 8, .form = 3, .label = "any third order"});
+  // Pixels that are oblong or askew. Turn and scale of the image are camera_similarity.
+  out->push_back({.axis = EffectAxis::kNone, .columns = 2, .form = 4, .label = "sheared"});
 }
 
 void ApplyCameraDistortion(const UnitTrack& track, const Template& form,
@@ -35,6 +37,9 @@ void ApplyCameraDistortion(const UnitTrack& track, const Template& form,
                                  a[4] * (x * x - y * y) - a[5] * 2 * x * y);
       errors->y_mm[i] += 1e-3 * (radial * y + a[3] * (r2 + 2 * y * y) + a[2] * 2 * x * y -
                                  a[4] * 2 * x * y - a[5] * (x * x - y * y));
+    } else if (form.form == 4) {
+      errors->x_mm[i] += 1e-3 * (amplitude[0] * x + amplitude[1] * y);
+      errors->y_mm[i] += 1e-3 * (amplitude[1] * x - amplitude[0] * y);
     } else if (form.form == 0) {
       errors->x_mm[i] += amplitude[0] * 1e-3 * r2 * x;
       errors->y_mm[i] += amplitude[0] * 1e-3 * r2 * y;

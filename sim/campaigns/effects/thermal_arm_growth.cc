@@ -1,4 +1,6 @@
 // Thermal arm growth: the arms are longer when warm.
+#include <iterator>
+
 #include "sim/campaigns/effects/registry.h"
 #include "sim/campaigns/effects/thermal_mass.h"
 
@@ -10,7 +12,7 @@ void ListThermalArmGrowth(const CampaignFacts& facts, Templates* out) {
   ListGrid({.axes = arms}, out);
   if (facts.Has("t_s"))
     ListGrid({.axes = arms,
-              .shapes = {60, 200, 600},
+              .shapes = {std::begin(kTimeConstants_s), std::end(kTimeConstants_s)},
               .shape_name = "late by a time constant of, s,",
               .form = 1},
              out);

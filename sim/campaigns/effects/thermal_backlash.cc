@@ -1,15 +1,18 @@
 // Thermal backlash: clearance and viscosity change with temperature.
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "sim/campaigns/effects/registry.h"
+#include "sim/campaigns/effects/thermal_mass.h"
 
 namespace focalfleet::sim {
 namespace {
 
 // Form 0 is in proportion to temperature. Forms 1 and 2 follow Andrade's law of stiffening grease,
 // viscosity in proportion to exp(B / T). Their slope at the reference temperature is that of form
-// 0.
+// 0. Form 3 is form 0 for gears that are as warm as the unit around them, which is late.
+constexpr int kLate = 3;
 constexpr double kAndrade_K[] = {0, 1750, 2750};
 constexpr double kZero_K = 273.15;
 
@@ -26,6 +29,11 @@ void ListThermalBacklash(const CampaignFacts& facts, Templates* out) {
   ListGrid({.shapes = from, .shape_name = "from, C,"}, out);
   for (const int form : {1, 2})
     ListGrid({.shapes = from, .shape_name = "as grease stiffens, from, C,", .form = form}, out);
+  if (facts.Has("t_s"))
+    ListGrid({.shapes = {std::begin(kTimeConstants_s), std::end(kTimeConstants_s)},
+              .shape_name = "late by a time constant of, s,",
+              .form = kLate},
+             out);
 }
 
 void ApplyThermalBacklash(const UnitTrack& track, const Template& form,
@@ -33,12 +41,15 @@ void ApplyThermalBacklash(const UnitTrack& track, const Template& form,
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   const std::span<const double> temperature = track.Column("temp_C");
+  std::vector<double> late;
+  if (form.form == kLate) late = Late(temperature, track.Column("t_s"), form.shape);
+  const double usual_C = track.facts->Find("temp_C")->mean;
+  const auto warmer = [&](std::size_t i) {
+    return form.form == kLate ? late[i] - usual_C : Warmer(form.form, temperature[i], form.shape);
+  };
   AddRemembered(
       track, axis, form.memory,
-      [&](std::size_t i) {
-        return -amplitude[0] / 2 * Direction(step[i]) *
-               Warmer(form.form, temperature[i], form.shape);
-      },
+      [&](std::size_t i) { return -amplitude[0] / 2 * Direction(step[i]) * warmer(i); },
       &errors->angle_deg[axis]);
 }
 

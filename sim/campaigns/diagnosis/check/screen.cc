@@ -151,7 +151,7 @@ std::optional<UnknownFound> FindOddExposures(const Fit& fit, double family_wise)
         squares.push_back(one.b[axis] * one.b[axis] / one.g[axis]), sum += squares.back();
     if (squares.size() < kExposuresMin) continue;
     // Errors of most exposures that are alike, too, are noise that units share.
-    const double spread = std::max(Median(squares) / kMedianSquare, 1.0);
+    const double spread = std::max(MiddleOf(squares) / kMedianSquare, 1.0);
     const double most = *std::ranges::max_element(squares) / spread;
     const double log_p =
         LogLeastOf(LogChiSquareTail(most, 1), 2 * static_cast<double>(squares.size()));

@@ -80,4 +80,11 @@ double Quantile(std::vector<double> values, double share) {
   return *it;
 }
 
+double MiddleOf(std::vector<double> values) {
+  const auto upper = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), upper, values.end());
+  if (values.size() % 2 != 0) return *upper;
+  return (*std::max_element(values.begin(), upper) + *upper) / 2;
+}
+
 }  // namespace focalfleet::sim

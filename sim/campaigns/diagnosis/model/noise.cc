@@ -1,6 +1,7 @@
 // Noise and weights of a fit (fit.h, whiten.h). Variances come first, by maximum likelihood with
 // the density of Student's t, in which outliers cost a logarithm. Factors of units and of exposures
-// follow.
+// follow, by residuals in the spread that the fit leaves each of them.
+// Source: Cook and Weisberg, Residuals and Influence in Regression, 1982, chapter 2.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -144,7 +145,7 @@ void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
         squares.push_back((move.x_um * move.x_um + move.y_um * move.y_um) /
                           (unit.factor * unit.factor));
   if (squares.empty()) return;
-  const double typical = std::max(std::sqrt(Median(squares) / kMedianSquare), noise->least_um);
+  const double typical = std::max(std::sqrt(MiddleOf(squares) / kMedianSquare), noise->least_um);
   // A previous result that is near makes the search short. Without one, or with one far away, the
   // search is anew.
   const bool near =
@@ -162,12 +163,22 @@ void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
   noise->place_um = std::max(noise->place_um, noise->least_um);
 }
 
-std::size_t OwnColumns(const Fit& fit, std::size_t unit) {
-  std::size_t columns = kStaticColumns;
-  for (const ModelTerm& term : fit.model.terms)
-    if (term.sharing == Sharing::kUnit && term.group_of_unit[unit] != kNoGroup)
-      columns += term.form.columns;
-  return columns;
+// The share of its noise that is left in each used row beside the fit of the unit's own unknowns,
+// 0..1: one less the row's leverage.
+std::vector<double> SharesLeft(const Fit& fit, std::size_t unit, const WhiteUnit& white) {
+  constexpr double kLeast = 0.1;  // below it a row says nothing of the noise
+  Eigen::MatrixXd own = OwnDisplacements(fit, unit, white);
+  std::vector<double> left(white.moves.size(), kLeast);
+  if (own.rows() <= own.cols()) return left;
+  for (Eigen::Index c = 0; c < own.cols(); ++c) white.Apply(own.col(c).data());
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(own);
+  const Eigen::MatrixXd plane =
+      solver.householderQ() * Eigen::MatrixXd::Identity(own.rows(), solver.rank());
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(2 * k);
+    left[k] = std::max(1 - plane.middleRows<2>(at).squaredNorm() / 2, kLeast);
+  }
+  return left;
 }
 
 // Errors that all units may have alike in one exposure: of theta, of phi, in x, in y. They are an
@@ -182,7 +193,7 @@ struct WhiteRow {
   Eigen::Matrix<double, 2, kAlikeErrors> alike;
 };
 struct UnitLengths {
-  std::vector<double> square;  // of the used rows
+  std::vector<double> square;  // of the used rows, for what the fit has left of them
   std::vector<WhiteRow> rows;  // the same, divided by the unit's factor
 };
 
@@ -244,11 +255,11 @@ void Normalise(Noise* noise) {
   for (std::vector<double>* factors : {&noise->unit_factor, &noise->exposure_factor})
     for (double& factor : *factors) factor = std::max(factor, kFactorLeast);
   if (!noise->exposure_factor.empty()) {
-    const double usual = Median(noise->exposure_factor);
+    const double usual = MiddleOf(noise->exposure_factor);
     for (double& factor : noise->exposure_factor)
       factor = std::clamp(factor / usual, 1 / kExposureFactorMost, kExposureFactorMost);
   }
-  const double usual = Median(noise->unit_factor);
+  const double usual = MiddleOf(noise->unit_factor);
   for (double& factor : noise->unit_factor) factor /= usual;
   noise->place_um = std::max(noise->place_um * usual, noise->least_um);
   for (int axis = 0; axis < 2; ++axis)
@@ -276,10 +287,10 @@ std::vector<double> DrawTogether(const std::vector<LogVariance>& estimates) {
   for (const LogVariance& one : estimates)
     if (one.error2 > 0) values.push_back(one.value), errors2.push_back(one.error2);
   if (values.empty()) return std::vector<double>(estimates.size(), 0);
-  const double middle = Median(values);
+  const double middle = MiddleOf(values);
   for (const double value : values) deviations.push_back(std::abs(value - middle));
-  const double scatter = kMad * Median(std::move(deviations));
-  const double true2 = std::max(scatter * scatter - Median(std::move(errors2)), 0.0);
+  const double scatter = kMad * MiddleOf(std::move(deviations));
+  const double true2 = std::max(scatter * scatter - MiddleOf(std::move(errors2)), 0.0);
   std::vector<double> drawn;
   for (const LogVariance& one : estimates) {
     const double off = one.error2 > 0 ? one.value - middle : 0;
@@ -302,7 +313,7 @@ LogVariance ExposureVariance(const std::vector<const WhiteRow*>& rows, double fa
   for (const WhiteRow* row : rows) share += row->camera_share / n;
   // Squares grow by the camera's share of them. Their median is known to a part of itself, which
   // may be many times of a small variance of the camera.
-  const double whole = Median(LengthsOf(rows)) / kMedianSquare;
+  const double whole = MiddleOf(LengthsOf(rows)) / kMedianSquare;
   const double of_camera = std::max(1 + (whole - 1) / share, kLeast);
   const double error = whole / (share * of_camera);
   return {2 * std::log(factor) + std::log(of_camera), kMedianError / n * error * error};
@@ -310,6 +321,7 @@ LogVariance ExposureVariance(const std::vector<const WhiteRow*>& rows, double fa
 
 void FitFactors(Fit* fit) {
   constexpr std::size_t kUnitsMin = 6;  // that an exposure's factor is estimated from
+  constexpr double kRowsMin = 5;        // that a unit's is: geometry has six unknowns
   const std::size_t units = fit->model.units.size();
   const bool with_exposures = units >= kUnitsMin;
   std::vector<UnitLengths> lengths(units);
@@ -318,26 +330,26 @@ void FitFactors(Fit* fit) {
     for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit) {
       std::vector<double> weights;
       const WhiteUnit white = WhitenAnew(*fit, unit, &weights);
+      const std::vector<double> left = SharesLeft(*fit, unit, white);
       for (std::size_t k = 0; k < white.moves.size(); ++k) {
         const auto at = static_cast<Eigen::Index>(2 * k);
-        lengths[unit].square.push_back(white.y.segment<2>(at).squaredNorm() / weights[k]);
+        const double size = std::sqrt(weights[k] * left[k]);
+        lengths[unit].square.push_back(white.y.segment<2>(at).squaredNorm() / (size * size));
         if (with_exposures)
           lengths[unit].rows.push_back(
               {fit->facts->exposures.of_row[white.track.first_row + white.moves[k]],
-               CameraShare(*fit, unit, white, k, weights[k]),
-               white.y.segment<2>(at) / std::sqrt(weights[k]),
-               AlikeOf(white, k) / std::sqrt(weights[k])});
+               CameraShare(*fit, unit, white, k, weights[k]), white.y.segment<2>(at) / size,
+               AlikeOf(white, k) / size});
       }
     }
   });
   std::vector<LogVariance> of_unit(units);
   for (std::size_t unit = 0; unit < units; ++unit) {
-    const double n = 2.0 * static_cast<double>(lengths[unit].square.size());
-    const double left = n - static_cast<double>(OwnColumns(*fit, unit));
-    if (left < 4) continue;
-    const double own = Median(lengths[unit].square) / kMedianSquare * n / left;
+    const auto rows = static_cast<double>(lengths[unit].square.size());
+    if (rows < kRowsMin) continue;
+    const double own = MiddleOf(lengths[unit].square) / kMedianSquare;
     of_unit[unit] = {2 * std::log(fit->noise.unit_factor[unit]) + std::log(std::max(own, 1e-6)),
-                     2 * kMedianError / left};
+                     kMedianError / rows};
   }
   const std::vector<double> unit_variance = DrawTogether(of_unit);
   std::vector<std::vector<const WhiteRow*>> of_exposure(fit->facts->exposures.size());

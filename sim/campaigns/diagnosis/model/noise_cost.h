@@ -36,6 +36,10 @@ struct NoiseScratch {
   Eigen::MatrixXd normal;
 };
 
+/// Displacements by the unit's own unknowns, each of length 1: geometry, own amplitudes, zeros of
+/// homings. Before whitening. Shape: (2 used rows, unknowns).
+Eigen::MatrixXd OwnDisplacements(const Fit& fit, std::size_t unit, const WhiteUnit& white);
+
 /// Whole units, evenly from the fleet.
 std::vector<NoiseUnit> SampleForNoise(const Fit& fit);
 

@@ -153,7 +153,7 @@ Level SumLevel(const Score& score, const Template& form, Sharing sharing,
 }
 
 // ln p of the level: its best group among all, or all together.
-double LevelLogP(const Level& level) {
+double LevelLogP(const Level& level, const NoiseLevel& noise) {
   double sum = 0, dof = 0;
   double tests = 0;
   std::array<double, kColumnsMax + 1> most{};  // chi-square of the best group, by its freedom
@@ -174,10 +174,9 @@ double LevelLogP(const Level& level) {
     if (most[freedom] > 0)
       best =
           std::min(best, LogChiSquareTail(most[freedom] / inflation, static_cast<double>(freedom)));
-  // A sum over many units also counts the error of all units' noise.
-  constexpr double kNoiseOfNoise = 0.2, kMany = 20;
-  const double all =
-      LogChiSquareTail(sum / (1 + kNoiseOfNoise * std::min(1.0, (dof - 1) / kMany)), dof);
+  // A sum over units varies by more than chance where the noise differs from template to template:
+  // a chi-square of that variance (Satterthwaite, Biometrics Bulletin 2, 110, 1946).
+  const double all = LogChiSquareTail(sum / (noise.mean * noise.excess), dof / noise.excess);
   return tests == 1 ? all : std::min(all, LogLeastOf(best, tests)) + std::log(2.0);
 }
 
@@ -341,15 +340,15 @@ double FleetDispersion(const Score& score, std::size_t columns) {
   return (effective * raw + kPrior) / (effective + kPrior);
 }
 
-Evidence Assess(const Score& score, const Template& form, const FleetGroups& groups) {
+Evidence Assess(const Score& score, const Template& form, const FleetGroups& groups,
+                const NoiseLevel& noise) {
   const std::size_t c = form.columns;
   const std::size_t units = score.b.size() / c;
   const double prior = form.effect->prior_size;
   Evidence best;
   best.dispersion = std::max(1.0, UnitDispersion(score));
   std::vector<Level> levels;
-  const bool of_the_whole =
-      form.effect->owner == Owner::kPlate || form.effect->owner == Owner::kCamera;
+  const bool of_the_whole = IsOfTheWhole(form);
   if (units == 1 || !of_the_whole) {
     levels.push_back(UnitLevel(score, form, best.dispersion));
     levels.back().together = Together(form.effect->owner, groups, units);
@@ -361,11 +360,11 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
     const Level cautious{Sharing::kFleet,
                          {DecomposePossible(form, score.fleet_b, score.fleet_g, fleet)},
                          std::vector<std::uint32_t>(units, 0)};
-    best.log_p = LevelLogP(cautious);
+    best.log_p = LevelLogP(cautious, {});
     const auto look = [&](Sharing sharing, const std::vector<std::uint32_t>& of,
                           std::size_t count) {
       best.log_p =
-          std::min(best.log_p, LevelLogP(SumLevel(score, form, sharing, of, count, fleet)));
+          std::min(best.log_p, LevelLogP(SumLevel(score, form, sharing, of, count, fleet), {}));
       levels.push_back(SumLevel(score, form, sharing, of, count, best.dispersion));
     };
     Level all{Sharing::kFleet,
@@ -378,9 +377,14 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
       look(Sharing::kBus, groups.bus, groups.buses);
     levels.push_back(std::move(all));
   }
+  // The levels are compared by noise that is as large as it was fitted, or larger. Chance is by
+  // what it is found to be.
+  const NoiseLevel of_units{std::max(noise.mean, UnitDispersion(score)) / best.dispersion,
+                            noise.excess};
   best.log_evidence = -std::numeric_limits<double>::infinity();
   for (const Level& level : levels)
-    if (level.sharing == Sharing::kUnit) best.log_p = std::min(best.log_p, LevelLogP(level));
+    if (level.sharing == Sharing::kUnit)
+      best.log_p = std::min(best.log_p, LevelLogP(level, of_units));
   best.log_p = std::min(0.0, best.log_p + std::log(static_cast<double>(levels.size())));
   // Units' own shapes have been paid for by each unit.
   const double price = form.shape_of_unit.empty() ? std::log(form.choices) : 0;

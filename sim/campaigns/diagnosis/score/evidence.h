@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "sim/campaigns/diagnosis/score/fleet_groups.h"
+#include "sim/campaigns/diagnosis/score/noise_level.h"
 #include "sim/campaigns/diagnosis/score/score.h"
 
 namespace focalfleet::sim {
@@ -29,7 +30,8 @@ struct Evidence {
 };
 
 /// The evidence for the template at its best level. Pre: score belongs to form.
-Evidence Assess(const Score& score, const Template& form, const FleetGroups& groups);
+Evidence Assess(const Score& score, const Template& form, const FleetGroups& groups,
+                const NoiseLevel& noise = {});
 
 /// Dispersion of the fleet's score about its fit, from exposure to exposure.
 double FleetDispersion(const Score& score, std::size_t columns);

@@ -30,21 +30,23 @@ constexpr double kBetterBy = 0.5;  // log evidence
 // `library`: the templates are some or all of it.
 std::vector<Evidence> AssessAll(const ScorePass& pass, const Templates& templates,
                                 const Templates& library, const FleetGroups& groups,
-                                const ParallelFor& parallel) {
+                                const ParallelFor& parallel, const NoiseLevel& noise) {
   std::vector<Evidence> evidence_of(templates.size());
   constexpr std::size_t kBlock = 16;
   const std::size_t blocks = (templates.size() + kBlock - 1) / kBlock;
   parallel(blocks, [&](std::size_t block) {
     const std::size_t end = std::min(templates.size(), (block + 1) * kBlock);
     for (std::size_t k = block * kBlock; k < end; ++k)
-      evidence_of[k] = Assess(pass.scores[k], templates[k], groups);
+      evidence_of[k] = Assess(pass.scores[k], templates[k], groups, noise);
   });
-  // A cause with many shapes fits by chance more often: each shape has its share of the cause.
+  // Causes are equally likely on each of their axes, and shapes have their share of the cause: one
+  // with many shapes fits by chance more often.
   std::map<std::pair<std::string_view, EffectAxis>, double> shapes;
   for (const Template& form : library) shapes[{form.effect->cause, form.axis}] += 1;
   for (std::size_t k = 0; k < templates.size(); ++k)
     evidence_of[k].log_evidence -=
-        std::log(shapes[{templates[k].effect->cause, templates[k].axis}]);
+        std::log(shapes[{templates[k].effect->cause, templates[k].axis}]) +
+        std::log(static_cast<double>(shapes.size()));
   return evidence_of;
 }
 
@@ -72,6 +74,8 @@ Best BestOf(const ScorePass& pass, const Templates& templates,
         !ComesFirst(templates[k], templates[best.at]))
       continue;
     if (std::ranges::none_of(evidence_of[k].has, [](char h) { return h != 0; })) continue;
+    // More likely than not: what chance reaches in one of a hundred campaigns may be less.
+    if (evidence_of[k].log_evidence <= 0) continue;
     most = evidence_of[k].log_evidence;
     best = {k, evidence_of[k], log_p};
   }
@@ -107,10 +111,14 @@ class LookBook {
   const Look& At(const Fit& fit, const Templates& templates, std::size_t without) {
     if (looks_.find(without) == looks_.end()) Open(fit, templates, without);
     Look& look = looks_.at(without);
+    // A term of the model stands out from all that is left beside it.
     if (look.evidence_of.empty())
-      look.evidence_of = AssessAll(look.pass, templates, templates, groups_, fit.parallel);
+      look.evidence_of = AssessAll(look.pass, templates, templates, groups_, fit.parallel,
+                                   without == kNoTerm ? noise_.below : noise_.around);
     return look;
   }
+  /// The level in the last state looked at.
+  [[nodiscard]] const NoiseLevel& noise() const { return noise_.below; }
   /// Call after a change of the fit or the templates.
   void Forget() { looks_.clear(); }
 
@@ -122,6 +130,9 @@ class LookBook {
       for (std::size_t t = 0; t < fit.model.terms.size(); ++t) withouts.push_back(t);
     }
     std::vector<ScorePass> passes = ScoreWithouts(fit, templates, withouts);
+    // The signal of a left-out term is no noise.
+    noise_ = withouts[0] == kNoTerm ? LevelsOf(passes[0].scores, templates, fit.parallel)
+                                    : NoiseLevels{};
     for (std::size_t k = 0; k < withouts.size(); ++k)
       looks_[withouts[k]].pass = std::move(passes[k]);
   }
@@ -129,15 +140,17 @@ class LookBook {
   const FleetGroups& groups_;
   bool one_by_one_;
   std::map<std::size_t, Look> looks_;
+  NoiseLevels noise_;  // of the state of the fit
 };
 
 // The best of the templates from `begin` on and the best of those before.
 Best BestAmong(const Fit& fit, const Templates& templates, const FleetGroups& groups,
-               std::size_t begin, const Best& before, double tests, double family_wise) {
+               const NoiseLevel& noise, std::size_t begin, const Best& before, double tests,
+               double family_wise) {
   const Templates refined(templates.begin() + static_cast<std::ptrdiff_t>(begin), templates.end());
   const ScorePass pass = ScoreTemplates(fit, refined);
   const std::vector<Evidence> evidence_of =
-      AssessAll(pass, refined, templates, groups, fit.parallel);
+      AssessAll(pass, refined, templates, groups, fit.parallel, noise);
   Best best = BestOf(pass, refined, evidence_of, tests, family_wise);
   if (best.at == kNoTerm || best.evidence.log_evidence <= before.evidence.log_evidence)
     return before;
@@ -155,13 +168,11 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
                             std::size_t own, const SelectionRule& rule) {
   std::map<std::string_view, Rival> by_cause;
   const Evidence& best = look.evidence_of[own];
-  // Where geometry leaves little of the term's own signature, as little of a rival's is enough.
-  const Score& mine = look.pass.scores[own];
-  const double kept_min = std::min(kKeptMin, 0.5 * mine.kept / mine.raw);
   for (std::size_t k = 0; k < templates.size(); ++k) {
     const std::string_view cause = templates[k].effect->cause;
     if (cause == templates[own].effect->cause) continue;
-    if (!(look.pass.scores[k].kept > kept_min * look.pass.scores[k].raw)) continue;
+    // A rival may be what geometry explains for the most part: its size is no reason against it.
+    if (!(look.pass.scores[k].kept > 0)) continue;
     const double behind = 2 * (best.log_evidence - look.evidence_of[k].log_evidence);
     const double share =
         ShareOfTarget(look.pass.scores[k], templates[k], best, groups, look.pass.target_square);
@@ -302,8 +313,9 @@ ModelTerm MakeTerm(const Template& form, const Evidence& evidence, const FleetGr
 
 Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGroups& groups,
               const ParallelFor& parallel, double tests, double family_wise, double kept_min) {
-  return BestOf(pass, templates, AssessAll(pass, templates, templates, groups, parallel), tests,
-                family_wise, kept_min);
+  const NoiseLevel noise = LevelsOf(pass.scores, templates, parallel).below;
+  return BestOf(pass, templates, AssessAll(pass, templates, templates, groups, parallel, noise),
+                tests, family_wise, kept_min);
 }
 
 std::vector<Rival> FindRivals(const Templates& templates, const SelectionRule& rule, const Fit& fit,
@@ -317,6 +329,15 @@ std::vector<Rival> FindRivals(const Templates& templates, const SelectionRule& r
 }
 
 namespace {
+
+// Whether chance does not explain the last term either beside what is left now.
+bool StandsOut(const Templates& templates, const SelectionRule& rule, double tests, const Fit& fit,
+               LookBook* looks) {
+  const std::size_t last = fit.model.terms.size() - 1;
+  const Look& look = looks->At(fit, templates, last);
+  const std::size_t own = IndexOf(templates, fit.model.terms[last].form);
+  return LogLeastOf(look.evidence_of[own].log_p, tests) <= std::log(rule.family_wise);
+}
 
 // Adds the best template, with the shape that suits it. False: chance explains what is left.
 bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* templates,
@@ -336,6 +357,7 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
   if (full) return false;
   Best best = BestOf(look.pass, *templates, look.evidence_of, selection->tests, rule.family_wise);
   const std::size_t listed = templates->size();
+  const NoiseLevel noise = looks->noise();
   std::vector<CandidateShape> candidate_shapes =
       CandidateShapesOf(look.pass, look.evidence_of, *templates, best.at, kKeptMin);
   // Evidence may grow where each unit's shape is refined, too.
@@ -348,13 +370,17 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
   for (CandidateShape& one : candidate_shapes)
     if (IndexOf(*templates, one.form) == kNoTerm) templates->push_back(std::move(one.form));
   if (templates->size() > listed)
-    best = BestAmong(*fit, *templates, groups, listed, best, selection->tests, rule.family_wise);
+    best = BestAmong(*fit, *templates, groups, noise, listed, best, selection->tests,
+                     rule.family_wise);
   if (best.at == kNoTerm) return false;
   const CampaignModel before = fit->model;
   fit->model.terms.push_back(MakeTerm((*templates)[best.at], best.evidence, groups));
   StepFit(fit);
   RefitTerms(fit);
-  if (SizeOf(*fit, fit->model.terms.back()) >= rule.size_min_um) return true;
+  if (SizeOf(*fit, fit->model.terms.back()) >= rule.size_min_um &&
+      StandsOut(*templates, rule, selection->tests, *fit, looks))
+    return true;
+  looks->Forget();
   fit->model = before;
   UpdateResiduals(fit);
   RefitTerms(fit);

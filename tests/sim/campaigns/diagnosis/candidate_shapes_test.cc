@@ -51,7 +51,8 @@ TEST(OwnShapes, TeethElsewhereInEachUnitAreOneCause) {
   EXPECT_EQ(diagnosis.causes[0].cause, "tooth_damage");
   EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Reported(diagnosis);
   EXPECT_TRUE(diagnosis.causes[0].all_units);
-  EXPECT_NEAR(diagnosis.causes[0].amplitude, kHeight_deg, 0.15 * kHeight_deg);
+  // The library has two widths, which this one lies between.
+  EXPECT_NEAR(diagnosis.causes[0].amplitude, kHeight_deg, 0.2 * kHeight_deg);
   ASSERT_EQ(diagnosis.model.terms.size(), 1u);
   const auto& shapes = diagnosis.model.terms[0].form.shape_of_unit;
   ASSERT_EQ(shapes.size(), campaign.units.size());
@@ -69,9 +70,16 @@ TEST(OwnShapes, ATeethsLongMeshIsNothingElse) {
     const Diagnosis diagnosis = Verdicts(campaign);
     ASSERT_FALSE(diagnosis.causes.empty()) << width_deg << Reported(diagnosis);
     EXPECT_EQ(diagnosis.causes[0].cause, "tooth_damage");
-    // Beside a mesh that is much longer than the library's, a little stays that a zero takes.
-    for (std::size_t k = 1; k < diagnosis.causes.size(); ++k)
-      EXPECT_EQ(diagnosis.causes[k].cause, "zero_offset") << width_deg << Reported(diagnosis);
+    // Beside a mesh that is much longer than the library's, a little stays: of one wave a turn of
+    // the pinion, and what a zero takes.
+    for (std::size_t k = 1; k < diagnosis.causes.size(); ++k) {
+      EXPECT_THAT(diagnosis.causes[k].cause, testing::AnyOf("zero_offset", "pinion_runout"))
+          << width_deg << Reported(diagnosis);
+      EXPECT_LT(diagnosis.causes[k].size_um, 0.5 * diagnosis.causes[0].size_um)
+          << width_deg << Reported(diagnosis);
+      EXPECT_TRUE(width_deg > 20 || diagnosis.causes[k].cause == "zero_offset")
+          << Reported(diagnosis);
+    }
   }
 }
 

@@ -131,6 +131,23 @@ TEST(Diagnosis, ALensOverAWidePlateIsNoTiltOfEachUnit) {
   EXPECT_NEAR(diagnosis.causes[0].amplitude, 40, 2);
 }
 
+// Oblong pixels shear the image. Within each unit's reach that is what an axis does that leans, in
+// one direction in all units.
+TEST(Diagnosis, AShearedImageIsNoTiltForSure) {
+  constexpr double kShear = 3e-4;
+  Campaign campaign = Planted({}, {.units = 60});
+  for (std::size_t row = 0; row < campaign.rows(); ++row)
+    campaign.x_mm[row] *= 1 + kShear, campaign.y_mm[row] *= 1 - kShear;
+  const Diagnosis diagnosis = Verdicts(campaign);
+  const auto sheared = std::ranges::find_if(diagnosis.causes, [](const CauseFound& cause) {
+    return std::ranges::find(cause.candidates, "camera_distortion") != cause.candidates.end();
+  });
+  ASSERT_NE(sheared, diagnosis.causes.end()) << Reported(diagnosis);
+  for (const CauseFound& cause : diagnosis.causes)
+    EXPECT_THAT(cause.candidates, testing::Not(testing::ElementsAre("axis_tilt")))
+        << Reported(diagnosis);
+}
+
 TEST(Diagnosis, TwoNamesForOneEffectAreAnAmbiguityOfTwo) {
   std::vector<Effect> library = EffectLibrary();
   Effect twin = *FindEffect("eccentricity");

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "sim/campaigns/effects/registry.h"
+#include "sim/campaigns/effects/thermal_mass.h"
 #include "sim/campaigns/planting/planted.h"
 
 namespace focalfleet::sim {
@@ -199,6 +200,29 @@ TEST(Effects, GreaseStiffensFasterTheColderItIs) {
     }
     EXPECT_GT(moved, 10u);
   }
+}
+
+TEST(Effects, GearsAreAsWarmAsTheUnitAroundThem) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
+  constexpr double kTau_s = 200, kSize = 0.02;
+  const auto late = Late(track.Column("temp_C"), track.Column("t_s"), kTau_s);
+  const double usual_C = facts.Find("temp_C")->mean;
+  const auto errors = Applied(track,
+                              {.effect = FindEffect("thermal_backlash"),
+                               .axis = EffectAxis::kTheta,
+                               .form = 3,
+                               .shape = kTau_s},
+                              kSize);
+  double most = 0;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const double step = track.step_deg[kTheta][i];
+    if (step == 0) continue;
+    EXPECT_NEAR(errors[i], -std::copysign(kSize / 2, step) * (late[i] - usual_C), 1e-12);
+    most = std::max(most, std::abs(late[i] - track.Column("temp_C")[i]));
+  }
+  EXPECT_GT(most, 0.01) << "the unit is never later than the air";
 }
 
 // A rotor that holds a load x of its pull-out at nominal drive rests asin(x / drive) behind its
