@@ -33,25 +33,18 @@ Taken TakenBy(const Score& score, std::size_t columns) {
   return sum;
 }
 
-// The variance of standard numbers, without those that are far off.
-double ExcessOf(std::vector<double> off) {
-  constexpr double kSigmaOfMedian = 1.4826;  // standard deviation of a normal law by its median
-  if (off.empty()) return 1;
-  const double scatter = kSigmaOfMedian * MiddleOf(std::move(off));
-  return std::max(scatter * scatter, 1.0);
-}
-
 }  // namespace
 
 bool IsOfTheWhole(const Template& form) {
   return form.effect->owner == Owner::kPlate || form.effect->owner == Owner::kCamera;
 }
 
-NoiseLevels LevelsOf(const std::vector<Score>& scores, const Templates& templates,
-                     const ParallelFor& parallel) {
+NoiseLevel LevelOf(const std::vector<Score>& scores, const Templates& templates,
+                   const ParallelFor& parallel) {
   constexpr std::size_t kTemplatesMin = 20;  // that say what most have in common
   // Noise that is fitted to the same residuals is not wrong by more. Half and twice: never reached.
   constexpr double kLeast = 0.5;
+  constexpr double kSigmaOfMedian = 1.4826;  // standard deviation of a normal law by its median
   std::vector<Taken> found(templates.size());
   parallel(templates.size(), [&](std::size_t k) {
     if (templates[k].shape_of_unit.empty() && !IsOfTheWhole(templates[k]))
@@ -59,15 +52,17 @@ NoiseLevels LevelsOf(const std::vector<Score>& scores, const Templates& template
   });
   std::erase_if(found, [](const Taken& one) { return !(one.freedom > 0); });
   if (found.size() < kTemplatesMin) return {};
-  std::vector<double> means, below, around;
+  std::vector<double> means, below;
   for (const Taken& one : found) means.push_back(one.mean);
-  const double mean = std::clamp(MiddleOf(std::move(means)), kLeast, 1.0);
-  for (const Taken& one : found) {
-    const double off = (one.mean / mean - 1) * std::sqrt(one.freedom / 2);
-    around.push_back(std::abs(off));
-    if (off < 0) below.push_back(-off);
-  }
-  return {{mean, ExcessOf(std::move(below))}, {mean, ExcessOf(std::move(around))}};
+  NoiseLevel level{.mean = std::clamp(MiddleOf(std::move(means)), kLeast, 1.0)};
+  // Effects only add to chi-square: its scatter by noise is seen below the middle.
+  for (const Taken& one : found)
+    if (one.mean < level.mean)
+      below.push_back((1 - one.mean / level.mean) * std::sqrt(one.freedom / 2));
+  if (below.empty()) return level;
+  const double scatter = kSigmaOfMedian * MiddleOf(std::move(below));
+  level.excess = std::max(scatter * scatter, 1.0);
+  return level;
 }
 
 }  // namespace focalfleet::sim

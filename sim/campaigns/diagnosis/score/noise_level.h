@@ -16,17 +16,10 @@ struct NoiseLevel {
   double excess = 1;  // its variance, in that of chance; at least 1
 };
 
-/// The level that most of the templates share. Effects that are not found yet only add to
-/// chi-square: the noise's own excess is seen below the middle. A structure that no template has
-/// makes all of them differ, and a cause that joins has to stand out from that as well.
-struct NoiseLevels {
-  NoiseLevel below;   // excess by the templates below the middle
-  NoiseLevel around;  // by all templates
-};
-
-/// Fewer than 20 templates have the level of chance alone. Cost: O(templates units).
-NoiseLevels LevelsOf(const std::vector<Score>& scores, const Templates& templates,
-                     const ParallelFor& parallel);
+/// The level that most of the templates share. Fewer than 20 templates have that of chance. Cost:
+/// O(templates units).
+NoiseLevel LevelOf(const std::vector<Score>& scores, const Templates& templates,
+                   const ParallelFor& parallel);
 
 /// Whether the template belongs to the plate or its image, and no unit has it alone.
 bool IsOfTheWhole(const Template& form);

@@ -111,14 +111,12 @@ class LookBook {
   const Look& At(const Fit& fit, const Templates& templates, std::size_t without) {
     if (looks_.find(without) == looks_.end()) Open(fit, templates, without);
     Look& look = looks_.at(without);
-    // A term of the model stands out from all that is left beside it.
     if (look.evidence_of.empty())
-      look.evidence_of = AssessAll(look.pass, templates, templates, groups_, fit.parallel,
-                                   without == kNoTerm ? noise_.below : noise_.around);
+      look.evidence_of = AssessAll(look.pass, templates, templates, groups_, fit.parallel, noise_);
     return look;
   }
   /// The level in the last state looked at.
-  [[nodiscard]] const NoiseLevel& noise() const { return noise_.below; }
+  [[nodiscard]] const NoiseLevel& noise() const { return noise_; }
   /// Call after a change of the fit or the templates.
   void Forget() { looks_.clear(); }
 
@@ -131,8 +129,8 @@ class LookBook {
     }
     std::vector<ScorePass> passes = ScoreWithouts(fit, templates, withouts);
     // The signal of a left-out term is no noise.
-    noise_ = withouts[0] == kNoTerm ? LevelsOf(passes[0].scores, templates, fit.parallel)
-                                    : NoiseLevels{};
+    noise_ =
+        withouts[0] == kNoTerm ? LevelOf(passes[0].scores, templates, fit.parallel) : NoiseLevel{};
     for (std::size_t k = 0; k < withouts.size(); ++k)
       looks_[withouts[k]].pass = std::move(passes[k]);
   }
@@ -140,7 +138,7 @@ class LookBook {
   const FleetGroups& groups_;
   bool one_by_one_;
   std::map<std::size_t, Look> looks_;
-  NoiseLevels noise_;  // of the state of the fit
+  NoiseLevel noise_;  // of the state of the fit
 };
 
 // The best of the templates from `begin` on and the best of those before.
@@ -313,7 +311,7 @@ ModelTerm MakeTerm(const Template& form, const Evidence& evidence, const FleetGr
 
 Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGroups& groups,
               const ParallelFor& parallel, double tests, double family_wise, double kept_min) {
-  const NoiseLevel noise = LevelsOf(pass.scores, templates, parallel).below;
+  const NoiseLevel noise = LevelOf(pass.scores, templates, parallel);
   return BestOf(pass, templates, AssessAll(pass, templates, templates, groups, parallel, noise),
                 tests, family_wise, kept_min);
 }
@@ -329,15 +327,6 @@ std::vector<Rival> FindRivals(const Templates& templates, const SelectionRule& r
 }
 
 namespace {
-
-// Whether chance does not explain the last term either beside what is left now.
-bool StandsOut(const Templates& templates, const SelectionRule& rule, double tests, const Fit& fit,
-               LookBook* looks) {
-  const std::size_t last = fit.model.terms.size() - 1;
-  const Look& look = looks->At(fit, templates, last);
-  const std::size_t own = IndexOf(templates, fit.model.terms[last].form);
-  return LogLeastOf(look.evidence_of[own].log_p, tests) <= std::log(rule.family_wise);
-}
 
 // Adds the best template, with the shape that suits it. False: chance explains what is left.
 bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* templates,
@@ -377,10 +366,7 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
   fit->model.terms.push_back(MakeTerm((*templates)[best.at], best.evidence, groups));
   StepFit(fit);
   RefitTerms(fit);
-  if (SizeOf(*fit, fit->model.terms.back()) >= rule.size_min_um &&
-      StandsOut(*templates, rule, selection->tests, *fit, looks))
-    return true;
-  looks->Forget();
+  if (SizeOf(*fit, fit->model.terms.back()) >= rule.size_min_um) return true;
   fit->model = before;
   UpdateResiduals(fit);
   RefitTerms(fit);

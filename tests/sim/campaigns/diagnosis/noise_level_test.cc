@@ -28,12 +28,10 @@ TEST(NoiseLevel, IsLowerWhereTheNoiseIsTakenTooLarge) {
   const CampaignFacts facts = MakeFacts(campaign);
   const Templates templates = WholeLibrary(facts);
   Fit fit = StaticFit(facts);
-  const NoiseLevel fitted =
-      LevelsOf(ScoreTemplates(fit, templates).scores, templates, fit.parallel).around;
+  const NoiseLevel fitted = LevelOf(ScoreTemplates(fit, templates).scores, templates, fit.parallel);
   EXPECT_NEAR(fitted.mean, 1, 0.08);
   for (double& factor : fit.noise.unit_factor) factor *= kTooLarge;
-  const NoiseLevel large =
-      LevelsOf(ScoreTemplates(fit, templates).scores, templates, fit.parallel).around;
+  const NoiseLevel large = LevelOf(ScoreTemplates(fit, templates).scores, templates, fit.parallel);
   EXPECT_NEAR(large.mean / fitted.mean, 1 / (kTooLarge * kTooLarge), 0.02);
 }
 
@@ -46,7 +44,7 @@ TEST(NoiseLevel, LetsManyUnitsSpeakTogether) {
   const Templates templates = WholeLibrary(facts);
   const Fit fit = StaticFit(facts);
   const ScorePass pass = ScoreTemplates(fit, templates);
-  const NoiseLevel noise = LevelsOf(pass.scores, templates, fit.parallel).below;
+  const NoiseLevel noise = LevelOf(pass.scores, templates, fit.parallel);
   std::string_view clearest;
   double least = 0;
   for (std::size_t k = 0; k < templates.size(); ++k) {
