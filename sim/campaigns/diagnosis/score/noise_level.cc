@@ -42,7 +42,7 @@ bool IsOfTheWhole(const Template& form) {
 NoiseLevel LevelOf(const std::vector<Score>& scores, const Templates& templates,
                    const ParallelFor& parallel) {
   constexpr std::size_t kTemplatesMin = 20;  // that say what most have in common
-  // Noise that is fitted to the same residuals is not wrong by more. Half and twice: never reached.
+  // Noise that is fitted to the same residuals is hardly wrong by more. Half of it: not measured.
   constexpr double kLeast = 0.5;
   constexpr double kSigmaOfMedian = 1.4826;  // standard deviation of a normal law by its median
   std::vector<Taken> found(templates.size());
