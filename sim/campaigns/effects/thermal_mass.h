@@ -6,8 +6,8 @@
 
 namespace focalfleet::sim {
 
-/// Time constants to look for, a factor of three apart. 20 g of aluminium (900 J/(kg K)) with 60 cm^2
-/// in still air (5 W/(m^2 K)) take 600 s, a tenth of that in wind or on a cooled plate.
+/// Time constants to look for, a factor of three apart. 20 g of aluminium (900 J/(kg K)) with
+/// 60 cm^2 in still air (5 W/(m^2 K)) take 600 s, a tenth of that in wind or on a cooled plate.
 inline constexpr double kTimeConstants_s[] = {60, 200, 600};
 
 /// The temperature of a body with the time constant `tau_s` in surroundings of `temperature_C`,
