@@ -9,12 +9,18 @@
 #include <vector>
 
 #include "daemon/access/caller.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 
 /// A server never gives an id twice, so an answer cannot reach another client than the one that
 /// asked.
 using ClientId = std::uint64_t;
+
+/// Open requests of all clients that there can be. More are of clients that came, asked and went.
+inline constexpr std::size_t kOpenRequestsMax =
+    (limits::kControlClients + limits::kControlClientsReserved) *
+    std::size_t{limits::kControlRequestsOpen};
 
 struct IncomingLine {
   ClientId client = 0;

@@ -244,8 +244,10 @@ struct Kind<std::vector<T>> {
     for (const T& element : list) WriteFields(element, out);
   }
   static void Read(ByteReader* in, std::vector<T>* list) {
-    list->resize(ReadSize(in));
-    for (T& element : *list) ReadFields(in, &element);
+    // Elements are made one by one: a length that was never written asks for no memory.
+    list->clear();
+    for (std::size_t left = ReadSize(in); left > 0 && in->good; --left)
+      ReadFields(in, &list->emplace_back());
   }
 };
 template <class T>

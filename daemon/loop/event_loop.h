@@ -16,13 +16,14 @@ namespace focalfleet {
 using PlannerThread = JobThread<PlannerWork, PlanDone>;
 using CameraThread = JobThread<CameraWork, ExposureDone>;
 using ReaderThread = JobThread<StoreQuestion, StoreAnswer>;
+using StateThread = JobThread<StateRows, std::string>;
 
 class EventLoop {
  public:
   /// All parts outlive the loop, which sets `shell.look`. Pre: the shell has a service report.
   struct Parts {
     Shell::Parts shell;
-    const EventSignal* threads = nullptr;  // raised by planner, camera, store, reader
+    const EventSignal* threads = nullptr;  // raised by planner, camera, store, reader, state
     std::function<void()> hang_up;         // what SIGHUP asks for: the log is opened anew
   };
 

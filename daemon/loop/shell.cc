@@ -103,7 +103,12 @@ void Shell::Step() {
   // This order matters: a batch that is committed in between is reported one step later.
   // The store's thread may change its failure at any time, so it is read once.
   const std::optional<Error> failure = parts_.store->failure();
-  if (store_.failing != failure.has_value()) parts_.alarms->NoteStore(parts_.clock.Wall(), failure);
+  if (store_.failing != failure.has_value()) {
+    parts_.alarms->NoteStore(parts_.clock.Wall(), failure);
+    // Other failures are logged by the writer, whose thread now waits for the disk.
+    if (failure && parts_.store->hangs())
+      spdlog::error("the store cannot be written, nothing new is started: {}", failure->text);
+  }
   store_.failing = failure.has_value();
   store_.committed_through = parts_.store->committed_through();
   const std::vector<RefusedRow> refused = parts_.store->TakeRefused();
@@ -170,14 +175,18 @@ void Shell::SubmitPlan(PlanJob job) {
                    preview ? preview_given_up_ : nullptr,
                    parts_.coordinator->configuration().id};
   if (parts_.planner->Submit(&work)) return;
-  if (preview) return parts_.handler->RefusePreview();
-  not_done_plans_.push_back(
-      PlanFailed(work.job, {ErrorCode::kUnavailable, "the planner's thread has no room"}));
+  PlanDone failed =
+      PlanFailed(work.job, {ErrorCode::kUnavailable, "the planner's thread has no room"});
+  if (preview) return parts_.handler->PreviewDone(View(), failed);
+  not_done_plans_.push_back(std::move(failed));
 }
 
 void Shell::PublishStatus() {
   parts_.store->HandOver();
   parts_.handler->ShowProgress(View());
+  StateRequests& states = parts_.handler->states();
+  while (auto text = parts_.states->Take()) states.Written(std::move(*text));
+  states.Serve(View(), [this](StateRows* rows) { return parts_.states->Submit(rows); });
   if (parts_.metrics != nullptr) parts_.metrics->SampleIfDue(View());
   if (parts_.scheduler == nullptr || !parts_.scheduler->due(now_)) return;
   StatusBatch status = parts_.scheduler->Take(View(), last_batch_, store_.failing);

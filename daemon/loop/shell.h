@@ -42,6 +42,7 @@ struct PlannerWork {
 using PlannerQueue = JobQueue<PlannerWork, PlanDone>;
 using CameraQueue = JobQueue<CameraWork, ExposureDone>;
 using ReaderQueue = JobQueue<StoreQuestion, StoreAnswer>;
+using StateQueue = JobQueue<StateRows, std::string>;  // the text of `state`
 
 /// Places of a turn between two effects. A simulation of the daemon may end it there.
 enum class TurnPoint : std::uint8_t {
@@ -71,6 +72,7 @@ class Shell {
     CameraQueue* camera = nullptr;  // none: neither camera nor sensors
     StoreWriter* store = nullptr;
     ReaderQueue* reader = nullptr;
+    StateQueue* states = nullptr;
     StatusScheduler* scheduler = nullptr;  // none: DDS is off
     MetricsSampler* metrics = nullptr;     // none: no metrics are served
     SyncPulse* sync = nullptr;             // none: no SYNC line

@@ -25,17 +25,21 @@ StoreWriter::Sinks StoreThread::Hooked(Sinks sinks, const EventSignal* progresse
 }
 
 StoreThread::~StoreThread() {
-  if (thread_.joinable()) static_cast<void>(Finish());
+  if (!thread_.joinable()) return;
+  static_cast<void>(Finish());
+  if (thread_.joinable()) thread_.join();
 }
 
 Status StoreThread::Finish() {
-  ending_ = true;
+  constexpr std::chrono::milliseconds kLook{1};
   while (writer_.held() > 0 && !writer_.failing()) {
     writer_.HandOver();
-    std::this_thread::yield();
+    std::this_thread::sleep_for(kLook);
   }
+  ending_ = true;  // not before: a thread that has nothing left ends
   wake_.Raise();
-  thread_.join();
+  while (!ended_ && !writer_.hangs()) std::this_thread::sleep_for(kLook);
+  if (ended_) thread_.join();
   const auto failure = writer_.failure();
   if (!failure && writer_.held() == 0) return {};
   return tl::unexpected<Error>(failure.value_or(Error{}));
@@ -45,7 +49,10 @@ void StoreThread::Run() {
   NameThisThread("store");
   for (;;) {
     const StoreWriter::Rest rest = writer_.Turn(ending_);
-    if (rest.ended) return;
+    if (rest.ended) {
+      ended_ = true;
+      return;
+    }
     if (rest.wait != std::chrono::milliseconds(0)) wake_.Wait(rest.wait);
   }
 }

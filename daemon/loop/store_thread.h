@@ -41,8 +41,10 @@ class StoreThread {
   /// A thread that sleeps takes a turn.
   void Wake() const { wake_.Raise(); }
   /// All is durable and published, and the thread has ended. Errors: that of the last attempt to
-  /// commit; then rows are lost.
+  /// commit; then rows are lost. kUnavailable: no commit has ended for the writer's `hangs_after`;
+  /// then the thread still waits for the disk, and so does the destructor.
   Status Finish();
+  [[nodiscard]] bool ended() const { return ended_; }
 
  private:
   StoreThread(Sinks sinks, const EventSignal* progressed, EventSignal wake);
@@ -52,6 +54,7 @@ class StoreThread {
   EventSignal wake_;
   StoreWriter writer_;
   std::atomic<bool> ending_{false};
+  std::atomic<bool> ended_{false};
   std::thread thread_;
 };
 

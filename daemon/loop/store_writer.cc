@@ -74,8 +74,14 @@ std::vector<RefusedRow> StoreWriter::TakeRefused() {
 }
 
 std::optional<Error> StoreWriter::failure() const {
+  if (hangs()) return Error{ErrorCode::kUnavailable, "the disk does not answer"};
   const std::lock_guard lock(lock_);
   return failing_ ? std::optional(last_error_) : std::nullopt;
+}
+
+bool StoreWriter::hangs() const {
+  const std::int64_t began_ns = commit_began_ns_;
+  return began_ns != kNoCommit && sinks_.monotonic_ns() - began_ns >= NsOf(sinks_.hangs_after);
 }
 
 // ---- turns
@@ -123,7 +129,9 @@ bool StoreWriter::TryCommit(bool ending) {
     if (const char* const flaw = Flaw(open_.rows[k])) SetAside(k, flaw);
   while (!open_.rows.empty()) {
     std::size_t refused = open_.rows.size();
+    commit_began_ns_ = sinks_.monotonic_ns();
     const Status done = sinks_.commit(open_.rows, open_.at, &refused);
+    commit_began_ns_ = kNoCommit;
     if (done) break;
     const bool for_ever = done.error().code == ErrorCode::kInvalid && refused < open_.rows.size();
     if (!for_ever) {

@@ -4,7 +4,7 @@
 // others for ever. This row alone is set aside and reported. Status is published after the commit
 // of the rows that it reflects, never before. The writer returns three facts: the batch through
 // which all is durable, the rows up to there that were set aside, and whether the last attempt
-// failed.
+// failed. A commit that does not come back, because the disk hangs, is a failure for as long.
 //
 // Waiting batches become one transaction, in order. Thereby the writer falls behind a slow disk by
 // no more than one flush.
@@ -54,6 +54,10 @@ class StoreWriter {
     /// no rows wait, once an upkeep_period or as long as more is due.
     std::function<bool()> upkeep = [] { return false; };
     std::chrono::milliseconds retry_period{1000};
+    /// The time of a commit from which it hangs. A disk that is well flushes within a second, and a
+    /// slow one within some. With half of it such a disk would stop commands now and then; with
+    /// twice as much they would wait as long for nothing.
+    std::chrono::milliseconds hangs_after{10'000};
     std::chrono::milliseconds upkeep_period{3'600'000};
     std::function<std::int64_t()> monotonic_ns = &ReadMonotonicNs;
     std::function<WallTime()> wall = &WallTime::Now;
@@ -77,8 +81,10 @@ class StoreWriter {
   void HandOver();
 
   [[nodiscard]] std::uint64_t committed_through() const { return committed_through_; }
-  [[nodiscard]] bool failing() const { return failing_; }
-  /// Why the last attempt to commit failed; none: it did not.
+  [[nodiscard]] bool failing() const { return failing_ || hangs(); }
+  /// The commit that is under way takes longer than `hangs_after`.
+  [[nodiscard]] bool hangs() const;
+  /// Why the last attempt to commit failed or does not end; none: it did not fail, and none hangs.
   [[nodiscard]] std::optional<Error> failure() const;
   /// Rows that were set aside since the last call. Read committed_through() first: all rows set
   /// aside up to that batch are then in this result or in an earlier one.
@@ -112,6 +118,8 @@ class StoreWriter {
     std::size_t bytes = 0;  // of all its rows, also of those that were set aside since
   };
 
+  static constexpr std::int64_t kNoCommit = INT64_MAX;
+
   void Gather();
   bool TryCommit(bool ending);
   void SetAside(std::size_t row, const std::string& why);
@@ -127,6 +135,7 @@ class StoreWriter {
   std::atomic<std::uint64_t> committed_through_{0};
   std::atomic<std::size_t> bytes_waiting_{0};
   std::atomic<bool> failing_{false};
+  std::atomic<std::int64_t> commit_began_ns_{kNoCommit};
 
   mutable std::mutex lock_;
   std::vector<RefusedRow> refused_;  // under the lock

@@ -68,6 +68,10 @@ PlanDone PlanCaught(const PlannerWork& work, const Layout& layout, const std::at
   return done;
 }
 
+std::string StateCaught(const StateRows& rows, const std::atomic<bool>& /*ending*/) {
+  return Caught([&] { return StateText(*rows); }, [](const char*) { return std::string(); });
+}
+
 ExposureDone MeasureCaught(const CameraWork& work, const MeasuringParts& parts,
                            const std::atomic<bool>& ending, WorkCounters* counters) {
   ExposureDone done = Caught(

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <string>
 
 #include "daemon/camera/camera_work.h"
 #include "daemon/hall/fibre_carrier_work.h"
@@ -23,6 +24,9 @@ inline constexpr std::chrono::minutes kPlanWithin{15};
 PlanDone PlanCaught(const PlannerWork& work, const Layout& layout, const std::atomic<bool>& ending,
                     const std::function<void()>& alive,
                     std::chrono::nanoseconds within = kPlanWithin);
+
+/// The text of `state`; empty where memory ended.
+std::string StateCaught(const StateRows& rows, const std::atomic<bool>& ending);
 
 /// The parts that measure; either may be missing.
 struct MeasuringParts {

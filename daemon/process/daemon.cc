@@ -20,6 +20,7 @@
 #include "daemon/process/caught_jobs.h"
 #include "daemon/process/control_door.h"
 #include "daemon/process/counted_commit.h"
+#include "daemon/process/daemon_parts.h"
 #include "daemon/process/dds_setup.h"
 #include "daemon/process/fleet_setup.h"
 #include "daemon/process/http_door.h"
@@ -50,56 +51,6 @@ namespace {
 constexpr std::chrono::milliseconds kEndWithin{1000};
 /// The same for DDS, which takes 0.1 s. Half would be short on a busy host, twice as much over 2 s.
 constexpr std::chrono::milliseconds kStatusEndWithin{500};
-
-/// The parts that report to the service manager.
-struct Service {
-  WallTime started = WallTime::Now();
-  NotifySocket socket;
-  Heartbeat store;
-  Heartbeat status;
-  Heartbeat planner;
-  Heartbeat camera;
-  std::unique_ptr<Watchdog> watchdog;  // none: the manager expects no sign of life
-  std::unique_ptr<ServiceReport> report;
-};
-
-/// Where places of units come from. The thread ends before the workers that it uses.
-struct Measuring {
-  std::unique_ptr<CameraWorker> camera;          // none: there is no camera
-  CameraPort* port = nullptr;                    // of the camera, which owns it
-  std::unique_ptr<FibreCarrierWorker> carriers;  // none: no unit has sensors of its own
-  std::unique_ptr<CameraThread> thread;          // none: neither camera nor sensors
-  std::unique_ptr<CredentialWatch> credentials;  // none: no DDS Security. Renews camera and status
-};
-
-/// Where requests come in.
-struct Doors {
-  AuditTrail audit;
-  std::unique_ptr<RequestHandler> handler;
-  std::unique_ptr<DiagnosisJob> diagnosis;
-  std::unique_ptr<HttpServer> http;  // none: [http] has no port
-};
-
-/// Parts that share the common start with others.
-struct CommonStart {
-  std::unique_ptr<SyncPulse> sync;     // none: no SYNC line
-  std::unique_ptr<SectorSeat> sector;  // none: the daemon is no sector of a plane
-};
-
-struct StoreThreads {
-  std::unique_ptr<journal::JournalThread> journal;  // none: [journal] has a limit of 0
-  std::unique_ptr<StoreThread> writer;
-  std::unique_ptr<ReaderThread> reader;
-};
-
-/// Numbers for /metrics. The counters are kept also where there is no endpoint.
-struct Metrics {
-  WorkCounters work;
-  NewestValue<const PlannedPower> power;
-  NewestValue<const FleetMetrics> values;
-  std::unique_ptr<MetricsSampler> sampler;    // none: [metrics] has no port
-  std::unique_ptr<MetricsEndpoint> endpoint;  // none: the same, or not yet
-};
 
 double SecondsSince(std::chrono::steady_clock::time_point begun) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
@@ -302,6 +253,8 @@ Status Daemon::StartThreads() {
   // The watchdog does not wait for the reader: a long question must not restart the daemon.
   FOCALFLEET_TRY_ASSIGN(stored_.reader, ReaderThread::Create(StoreQuestions(config_.store.path),
                                                              signal_.get(), {.name = "reader"}));
+  FOCALFLEET_TRY_ASSIGN(doors_.states,
+                        StateThread::Create(&StateCaught, signal_.get(), {.name = "state"}));
   if (measuring_.camera != nullptr || measuring_.carriers != nullptr) {
     FOCALFLEET_TRY_ASSIGN(
         measuring_.thread,
@@ -327,6 +280,7 @@ Status Daemon::StartThreads() {
                                                      .camera = measuring_.thread.get(),
                                                      .store = &stored_.writer->writer(),
                                                      .reader = stored_.reader.get(),
+                                                     .states = doors_.states.get(),
                                                      .scheduler = status_.scheduler.get(),
                                                      .metrics = metrics_.sampler.get(),
                                                      .sync = start_.sync.get(),
@@ -420,7 +374,7 @@ Status Daemon::Run() {
 
 /// The order of the end: nothing more goes to the buses, then the last rows are stored, then
 /// clients learn of the end. The reader closes before the writer, which then leaves one file. Parts
-/// that may hang end meanwhile, or are left behind.
+/// that may hang end meanwhile, or are left behind, as is a store whose disk does not answer.
 Status Daemon::End() {
   const SlowEnd slow_end(&service_.socket,
                          {.progress = [this] { return stored_.writer->committed_through(); }});
@@ -442,11 +396,11 @@ Status Daemon::End() {
                                                                     status_.publisher.reset();
                                                                   }}});
   std::vector<std::string> left = ending_->Wait(kEndWithin);
-  store_.reset();
+  if (stored_.writer->ended()) store_.reset();
   doors_.handler.reset();
   for (std::string& part : status_.ending->Wait(kStatusEndWithin)) left.push_back(std::move(part));
-  left_ = !left.empty();
-  if (left_)
+  left_ = !left.empty() || !stored_.writer->ended();
+  if (!left.empty())
     spdlog::warn("{} did not end within {} ms and {} left behind", fmt::join(left, ", "),
                  kEndWithin.count(), left.size() == 1 ? "is" : "are");
   if (stored)

@@ -143,6 +143,10 @@ void Life::MakeQueues() {
                 return questions(question, ending);
               },
           .takes = [] { return Milliseconds(3); }});
+  states_ = std::make_unique<TimedQueue<StateRows, std::string>>(
+      TimedQueue<StateRows, std::string>::Options{
+          .work = [](const StateRows& rows) { return StateText(*rows); },
+          .takes = [] { return Milliseconds(5); }});
   if (around_.camera != nullptr) camera_ = around_.camera();
 }
 
@@ -158,6 +162,7 @@ void Life::MakeShell() {
                                                 .camera = camera_.get(),
                                                 .store = writer_.get(),
                                                 .reader = reader_.get(),
+                                                .states = states_.get(),
                                                 .scheduler = scheduler_.get(),
                                                 .clock = clock_,
                                                 .passed = around_.passed,
@@ -166,7 +171,7 @@ void Life::MakeShell() {
 
 HostInstant Life::wake_at() {
   if (hall_->waits() || progressed_ || around_.plant->hears()) return clock_.Now();
-  return std::min({shell_->wake_at(), writer_due_, planner_->due(), reader_->due(),
+  return std::min({shell_->wake_at(), writer_due_, planner_->due(), reader_->due(), states_->due(),
                    camera_ == nullptr ? kNever : camera_->due()});
 }
 

@@ -96,6 +96,7 @@ class Life {
   std::unique_ptr<StatusScheduler> scheduler_;
   std::unique_ptr<TimedQueue<PlannerWork, PlanDone>> planner_;
   std::unique_ptr<TimedQueue<StoreQuestion, StoreAnswer>> reader_;
+  std::unique_ptr<TimedQueue<StateRows, std::string>> states_;
   std::unique_ptr<NightCamera> camera_;
   std::unique_ptr<Shell> shell_;
 };

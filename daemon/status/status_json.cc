@@ -1,6 +1,5 @@
 #include "daemon/status/status_json.h"
 
-#include <fmt/compile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -304,48 +303,6 @@ Json UnitJson(const FleetView& view, PositionerIndex i) {
           {"clock", ClockJson(seen.clock)},
           {"theta", AxisJson(view, i, knowledge, Index(Axis::kTheta))},
           {"phi", AxisJson(view, i, knowledge, Index(Axis::kPhi))}};
-}
-
-std::string StateText(const FleetView& view) {
-  fmt::memory_buffer text;
-  const fmt::appender out(text);
-  const auto number = [&](const char* name, double value) {
-    if (std::isfinite(value))
-      fmt::format_to(out, FMT_COMPILE(",\"{}\":{}"), name, value);
-    else
-      fmt::format_to(out, FMT_COMPILE(",\"{}\":null"), name);
-  };
-  fmt::format_to(out, FMT_COMPILE("{{\"rows\":["));
-  for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
-    const UnitStatusValue unit = SnapshotUnit(view, {n});
-    fmt::format_to(out, FMT_COMPILE("{}{{\"unit_id\":{},\"serial\":{},\"phase\":\"{}\""),
-                   n == 0 ? "" : ",", unit.unit.value, unit.serial.value, Name(unit.phase));
-    for (const Axis axis : kAxes) {
-      const char* name = Name(axis);
-      const std::size_t a = Index(axis);
-      fmt::format_to(out, FMT_COMPILE(",\"{}_witness\":\"{}\""), name, Name(unit.witness[a]));
-      number(fmt::format(FMT_COMPILE("{}_low_deg"), name).c_str(), unit.low_deg[a]);
-      number(fmt::format(FMT_COMPILE("{}_high_deg"), name).c_str(), unit.high_deg[a]);
-      number(fmt::format(FMT_COMPILE("{}_offset_deg"), name).c_str(),
-             AngleDeg(view.coordinator->unit({n}).offset[a], view.layout->unit({n}).axis[a],
-                      view.coordinator->drives()[n].axis[a]));
-    }
-    number("x_mm", unit.x_fp_mm);
-    number("y_mm", unit.y_fp_mm);
-    const UnitDrive& drive = view.coordinator->drives()[n];
-    const std::optional<Pose>& target = view.coordinator->unit({n}).target;
-    const PointFp aim =
-        target ? FibreAt(view.layout->unit({n}), drive, *target) : PointFp{kNoNumber, kNoNumber};
-    fmt::format_to(out, FMT_COMPILE(",\"outcome\":\"{}\""), Name(unit.outcome));
-    number("target_x_mm", aim.x_mm);
-    number("target_y_mm", aim.y_mm);
-    fmt::format_to(out, FMT_COMPILE(",\"counter1\":{},\"repeat\":{},\"mode\":\"{}\""),
-                   drive.axis[0].counter1, drive.axis[0].repeat, Name(drive.mode));
-    number("v_bus_V", drive.v_bus_V);
-    fmt::format_to(out, FMT_COMPILE("}}"));
-  }
-  fmt::format_to(out, FMT_COMPILE("]}}"));
-  return fmt::to_string(text);
 }
 
 }  // namespace focalfleet

@@ -20,7 +20,5 @@ Json StatusJson(const FleetView& view, const ShellFacts& facts);
 /// The angles of a ball-jointed fibre carrier as its sensors report them.
 Json FibreCarrierJson(const FibreCarrierReading& carrier);
 Json UnitJson(const FleetView& view, PositionerIndex i);
-/// {"rows":[...]} of all units, as text: Json values would take ten times as long.
-std::string StateText(const FleetView& view);
 
 }  // namespace focalfleet

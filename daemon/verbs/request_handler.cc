@@ -22,9 +22,6 @@ namespace focalfleet {
 namespace {
 
 constexpr double kWaitMaxS = 1e6;
-/// Those of all clients there can be. More are of clients that came, asked and went.
-constexpr std::size_t kWaitersMax = (limits::kControlClients + limits::kControlClientsReserved) *
-                                    std::size_t{limits::kControlRequestsOpen};
 
 /// The numbers of the units that the request chooses.
 Result<Json> AskSelection(const ControlRequest& request, const FleetView& view) {
@@ -144,11 +141,9 @@ void RequestHandler::Do(const FleetView& view, const IncomingLine& line, const A
   }
   if (request->verb == "access") return Answer(pending, AccessJson(asked.caller));
   if (request->verb == "state") {
-    // The answer is spliced in as text, into the frame that EncodeResult makes.
-    std::string answer = EncodeResult(request->id, nullptr);
-    const std::size_t place = answer.find("null");
-    answer.replace(place, 4, StateText(view));
-    return Send(line.client, answer);
+    if (const Status waits = states_.Add(line.client, request->id); !waits)
+      Answer(pending, tl::unexpected<Error>(waits.error()));
+    return;
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
   if (auto reading = AskStore(view, *request, *options_.alarms))
@@ -326,7 +321,7 @@ void RequestHandler::Wait(const FleetView& view, const ControlRequest& request, 
         view.now +
         DurationNs{static_cast<std::int64_t>(*timeout_s * static_cast<double>(options_.second.ns))};
   }
-  if (waiting_ >= kWaitersMax)
+  if (waiting_ >= kOpenRequestsMax)
     return Answer(pending, Fail(ErrorCode::kFull, std::to_string(waiting_) +
                                                       " requests wait for the configuration; ask "
                                                       "again in a second"));
@@ -368,9 +363,9 @@ Status RequestHandler::Plan(const FleetView& view, const ControlRequest& request
   dry_run_ = {.pending = pending,
               .targeted = preview.targeted,
               .refused = std::move(preview.refused),
-              .since = view.now};
-  preview_job_ = std::move(preview.job);
-  preview_job_->job = next_request_++;  // names the plan for those who want to see its motion
+              .since = view.now,
+              .job = std::move(preview.job)};
+  dry_run_->job->job = next_request_++;  // names the plan for those who want to see its motion
   return {};
 }
 
@@ -382,10 +377,8 @@ void RequestHandler::PreviewDone(const FleetView& view, const PlanDone& done) {
   Answer(run.pending, tl::unexpected<Error>(done.plan.error()));
 }
 
-void RequestHandler::RefusePreview() {
-  if (!dry_run_) return;
-  Answer(std::exchange(dry_run_, std::nullopt)->pending,
-         Fail(ErrorCode::kFull, "the planner has no room; ask again when it is done"));
+std::optional<PlanJob> RequestHandler::TakePreview() {
+  return dry_run_ ? std::exchange(dry_run_->job, std::nullopt) : std::nullopt;
 }
 
 void RequestHandler::ShowProgress(const FleetView& view) {
@@ -416,10 +409,10 @@ void RequestHandler::Close() {
   pending_.merge(asked_);  // their numbers are from one series
   questions_.clear();
   asked_.clear();
-  for (const auto& [request, pending] : pending_)
-    Answer(pending,
-           Fail(ErrorCode::kUnavailable,
-                "the daemon ends; what moves goes on by itself and is read at the next start"));
+  const Error ends{ErrorCode::kUnavailable,
+                   "the daemon ends; what moves goes on by itself and is read at the next start"};
+  for (const auto& [request, pending] : pending_) Answer(pending, tl::unexpected<Error>(ends));
+  states_.Close(ends);
   pending_.clear();
   waiting_ = 0;
   reader_.reset();

@@ -1,7 +1,8 @@
 // The requests of the control socket. A request becomes a command of the coordinator, or is
 // answered at once, by one instant of the core thread. Questions about the past are answered by the
-// reader's thread (store_questions.h). Replies of the coordinator become answers, and clients that
-// wait for a configuration receive its progress.
+// reader's thread (store_questions.h), those about the state of all units by rows of one instant
+// (state_requests.h). Replies of the coordinator become answers, and clients that wait for a
+// configuration receive its progress.
 //
 // A stop is handled before everything else that was read in a turn, even from behind other lines of
 // its client. A turn with a stop handles no other line, so that the frames of the stop are on the
@@ -37,6 +38,7 @@
 #include "daemon/verbs/alarm_register.h"
 #include "daemon/verbs/audit_trail.h"
 #include "daemon/verbs/model_registry.h"
+#include "daemon/verbs/state_requests.h"
 #include "daemon/verbs/store_questions.h"
 #include "fleet/coordinate/preview.h"
 #include "fleet/coordinator.h"
@@ -60,12 +62,11 @@ class RequestHandler {
     std::uint32_t own_pid = 0;  // clients of this process may ask on behalf of others
   };
   RequestHandler(std::unique_ptr<LineExchange> server, Options options)
-      : server_(std::move(server)), options_(std::move(options)) {}
+      : server_(std::move(server)), options_(std::move(options)), states_(server_.get()) {}
 
   /// Bytes of lines and answers of one turn; the line that exceeds them is the turn's last. A byte
   /// costs 10 to 30 ns, so the budget is about a millisecond. With half of it most answers to
-  /// `status` would take two turns. With twice as much a stop would wait a millisecond longer. A
-  /// `state` of 5000 units exceeds the budget by far.
+  /// `status` would take two turns. With twice as much a stop would wait a millisecond longer.
   static constexpr std::size_t kTurnBytes = std::size_t{64} << 10;
   /// Cost of a line however short, as bytes: some 20 us of parsing, system calls and bookkeeping.
   static constexpr std::size_t kLineBytes = 1024;
@@ -82,19 +83,20 @@ class RequestHandler {
   void Reply(const FleetView& view, const ReplyEffect& reply);
   /// The planning job of a dry run that was asked for since the last call. The job never becomes
   /// the configuration; its answer goes to PreviewDone.
-  std::optional<PlanJob> TakePreview() { return std::exchange(preview_job_, std::nullopt); }
+  std::optional<PlanJob> TakePreview();
   void PreviewDone(const FleetView& view, const PlanDone& done);
-  /// The job that was taken found no room: its command is refused.
-  void RefusePreview();
   /// Hands questions to the store over, the oldest first, until `submit` finds no room. A
   /// question for which `submit` returns false is untouched.
   void SubmitQuestions(const std::function<bool(StoreQuestion*)>& submit);
   /// The client receives the store's answer.
   void Answered(const StoreAnswer& answer);
+  /// Those who wait for the state; to be served once a turn.
+  [[nodiscard]] StateRequests& states() { return states_; }
   /// Clients that wait receive progress, when it is time, or the end that they wait for.
   void ShowProgress(const FleetView& view);
-  /// The instant at which ShowProgress is due; kNever while no client waits.
+  /// The instant at which ShowProgress or states() is due; kNever while no client waits.
   [[nodiscard]] HostInstant wake_at() const {
+    if (states_.due()) return HostInstant{0};
     return waiting_ > 0 || dry_run_ ? progress_at_ : kNever;
   }
   /// All clients that wait receive that the daemon ends, and the store's reader is closed, so that
@@ -124,6 +126,7 @@ class RequestHandler {
     std::uint32_t targeted = 0;
     std::vector<Preview::Refused> refused = {};
     HostInstant since;
+    std::optional<PlanJob> job = {};  // until it is taken
   };
 
   void Handle(const FleetView& view, const IncomingLine& line, std::vector<Command>* commands);
@@ -158,8 +161,8 @@ class RequestHandler {
   bool stopped_ = false;         // the last turn handled stops alone
   std::size_t spent_bytes_ = 0;  // in this turn
   LogLimit refusals_;
+  StateRequests states_;
   std::optional<DryRun> dry_run_;
-  std::optional<PlanJob> preview_job_;
 };
 
 }  // namespace focalfleet

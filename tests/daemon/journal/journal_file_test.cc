@@ -12,6 +12,7 @@
 
 #include "daemon/clock/wall_time.h"
 #include "daemon/files/text_file.h"
+#include "daemon/journal/fields.h"
 #include "tests/support/scratch_folder.h"
 
 namespace focalfleet::journal {
@@ -260,6 +261,18 @@ TEST_F(JournalFile, WhatIsNoJournalIsRefused) {
   scratch_.Put("file", "");
   const auto writer = JournalWriter::Open({.folder = scratch_ / "file"}, SomeLife());
   EXPECT_FALSE(writer);
+}
+
+TEST(JournalFields, ALengthThatIsNotFilledMakesNoElements) {
+  using Large = std::array<double, 64>;
+  std::string bytes;
+  WriteFields(std::uint32_t{1000}, &bytes);
+  bytes.resize(sizeof(std::uint32_t) + 2 * sizeof(Large));  // two of them are there
+  std::vector<Large> read;
+  ByteReader reader{bytes};
+  ReadFields(&reader, &read);
+  EXPECT_FALSE(reader.good);
+  EXPECT_LE(read.size(), 3u);
 }
 
 }  // namespace

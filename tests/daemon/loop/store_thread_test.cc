@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <condition_variable>
 #include <mutex>
 
 #include "protocol/base/limits.h"
@@ -18,8 +19,9 @@ class Disk {
  public:
   StoreThread::Sinks Sinks() {
     return {.commit = [this](std::span<const Row> rows, WallTime, std::size_t* refused) -> Status {
-              const std::lock_guard lock(mutex_);
+              std::unique_lock lock(mutex_);
               ++attempts_;
+              answers_.wait(lock, [this] { return !hangs_; });
               if (broken_) return Fail(ErrorCode::kFull, "no space");
               for (*refused = 0; *refused < rows.size(); ++*refused)
                 if (TextOf(rows[*refused]) == "poison")
@@ -51,6 +53,12 @@ class Disk {
     const std::lock_guard lock(mutex_);
     broken_ = broken;
   }
+  /// A commit waits for as long.
+  void Hang(bool hangs) {
+    const std::lock_guard lock(mutex_);
+    hangs_ = hangs;
+    answers_.notify_all();
+  }
   /// The publisher takes nothing more.
   void HoldUp(bool behind) {
     const std::lock_guard lock(mutex_);
@@ -74,7 +82,9 @@ class Disk {
   void Log(std::string text) { log_.push_back(std::move(text)); }
 
   std::mutex mutex_;
+  std::condition_variable answers_;
   bool broken_ = false;
+  bool hangs_ = false;
   bool behind_ = false;
   int attempts_ = 0;
   std::vector<std::string> log_;
@@ -137,6 +147,40 @@ TEST(StoreThread, KeepsABatchThatCannotBeWrittenAndTriesAgain) {
   EXPECT_THAT(log[0], HasSubstr("no space"));
   EXPECT_EQ(log[1], "commit one");
   EXPECT_EQ(log[2], "commit two");
+}
+
+StoreThread::Sinks Impatient(StoreThread::Sinks sinks) {
+  sinks.hangs_after = std::chrono::milliseconds(20);
+  return sinks;
+}
+
+TEST(StoreThread, ACommitThatDoesNotEndIsAFailureForAsLong) {
+  Disk disk;
+  const EventSignal progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(Impatient(disk.Sinks()), &progressed).value();
+  disk.Hang(true);
+  thread->Commit(1, Named("a"));
+  ASSERT_TRUE(Await(progressed, [&] { return thread->failing(); }));
+  EXPECT_THAT(thread->failure().value().text, HasSubstr("does not answer"));
+  EXPECT_EQ(thread->committed_through(), 0u);
+  disk.Hang(false);
+  ASSERT_TRUE(Await(progressed, [&] { return thread->committed_through() == 1; }));
+  EXPECT_FALSE(thread->failing());
+  EXPECT_FALSE(thread->failure());
+  EXPECT_TRUE(thread->Finish());
+}
+
+TEST(StoreThread, TheEndDoesNotWaitForADiskThatDoesNotAnswer) {
+  Disk disk;
+  const EventSignal progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(Impatient(disk.Sinks()), &progressed).value();
+  disk.Hang(true);
+  thread->Commit(1, Named("a"));
+  const Status ended = thread->Finish();
+  ASSERT_FALSE(ended);
+  EXPECT_EQ(ended.error().code, ErrorCode::kUnavailable);
+  EXPECT_FALSE(thread->ended());
+  disk.Hang(false);  // the thread can end
 }
 
 TEST(StoreThread, SetsAsideARowThatCanNeverBeWrittenAndGoesOn) {

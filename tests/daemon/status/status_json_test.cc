@@ -11,16 +11,6 @@ namespace {
 
 using test::SmallFleet;
 
-TEST(StatusJson, StateTextIsJsonWithARowForEachUnit) {
-  const SmallFleet fleet;
-  const Json state = Json::parse(StateText(fleet.View()), nullptr, false);
-  ASSERT_TRUE(state.is_object());
-  ASSERT_EQ(state["rows"].size(), 3u);
-  EXPECT_EQ(state["rows"][1]["unit_id"], 2);
-  EXPECT_EQ(state["rows"][1]["theta_witness"], "unknown");
-  EXPECT_TRUE(state["rows"][1]["theta_low_deg"].is_null());
-}
-
 TEST(StatusJson, StatusCountsEveryUnitOnce) {
   const SmallFleet fleet;
   ShellFacts facts;

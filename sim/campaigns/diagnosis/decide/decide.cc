@@ -49,6 +49,13 @@ double DoubtBesideStronger(const CauseFound& cause, std::span<const CauseFound> 
 // the truth, and double of it one less.
 constexpr std::size_t kAnything = 8;
 
+// The probability that an empirical term, which the data do not separate from the names of the
+// axis, is the explanation.
+double DoubtByCurve(const CauseFound& cause) {
+  const auto odds = cause.log_odds.find(std::string(kSomethingUnknown));
+  return odds == cause.log_odds.end() ? 0 : 1 / (1 + std::exp(-odds->second / kTemperature));
+}
+
 void MoveNameless(Diagnosis* diagnosis) {
   std::erase_if(diagnosis->causes, [&](const CauseFound& cause) {
     if (cause.candidates.size() < kAnything) return false;
@@ -81,7 +88,7 @@ double DoubtOf(const CauseFound& cause, std::span<const UnknownFound> unknown) {
   constexpr double kWrong = 13, kSets = 285;
   constexpr double kAlone = (kWrong + 0.5) / (kSets + 1);  // the mean of Jeffreys' posterior
   if (TraitsOf(cause.cause).is_static) return 0;  // no other cause is like it, and none was wrong
-  return 1 - (1 - kAlone) * (1 - DoubtBeside(cause, unknown));
+  return 1 - (1 - kAlone) * (1 - DoubtBeside(cause, unknown)) * (1 - DoubtByCurve(cause));
 }
 
 std::vector<double> PosteriorOf(const CauseFound& cause) {

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "protocol/base/units.h"
+#include "sim/campaigns/diagnosis/decide/decide.h"
 #include "sim/campaigns/diagnosis/model/term_trace.h"
 #include "sim/campaigns/diagnosis/search/find_model.h"
 #include "sim/campaigns/diagnosis/terms/events.h"
@@ -35,6 +36,8 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
     cause.candidates.emplace_back(rival.cause);
     cause.log_odds[std::string(rival.cause)] = std::min(rival.log_odds, 0.0);
   }
+  if (accepted.log_odds_of_curve)
+    cause.log_odds[std::string(kSomethingUnknown)] = *accepted.log_odds_of_curve;
   cause.axis = Name(term.form.axis);
   cause.scope = ScopeOf(term, fit.model.units.size());
   std::size_t have = 0, all = 0;

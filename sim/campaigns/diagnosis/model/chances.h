@@ -35,6 +35,9 @@ double LogChoose(double n, double k);
 /// ln(sum exp(terms)); -infinity for none.
 double LogSum(std::span<const double> terms);
 
+/// The standard deviation of a normal law by the median of its deviations: 1 / Phi^-1(3/4).
+inline constexpr double kSigmaOfMedian = 1.4826;
+
 /// Lower quantile of unsorted values, by nearest rank. Pre: not empty, 0 <= share <= 1.
 double Quantile(std::vector<double> values, double share);
 inline double Median(std::vector<double> values) { return Quantile(std::move(values), 0.5); }

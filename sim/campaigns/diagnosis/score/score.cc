@@ -370,6 +370,19 @@ ScorePass EmptyPass(const Templates& templates, std::size_t units) {
 
 }  // namespace
 
+OwnFit FitOwn(const Score& score, std::size_t columns, std::size_t unit) {
+  constexpr int kMost = static_cast<int>(kColumnsMax);  // there may be thousands: without heap
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1>;
+  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
+  const auto c = static_cast<Index>(columns);
+  const Eigen::Map<const Small> b(score.b.data() + unit * columns, c);
+  const Eigen::Map<const Square> g(score.g.data() + unit * columns * columns, c, c);
+  if (!(g.trace() > 0)) return {};
+  const Eigen::CompleteOrthogonalDecomposition<Square> solver(g);
+  const Small amplitude = solver.solve(b);
+  return {b.dot(amplitude), static_cast<double>(solver.rank())};
+}
+
 bool IsImpossible(const Template& form, const Eigen::Ref<const VectorXd>& b,
                   const Eigen::Ref<const MatrixXd>& g) {
   constexpr double kSigmas = 3;

@@ -43,6 +43,13 @@ struct ScorePass {
   std::size_t values = 0;      // whitened numbers in the data
 };
 
+/// The part of a unit's residuals that amplitudes of its own explain.
+struct OwnFit {
+  double chi_square = 0;
+  double freedom = 0;  // directions that the data show
+};
+OwnFit FitOwn(const Score& score, std::size_t columns, std::size_t unit);
+
 /// Whether the amplitude that fits best, (g)^-1 b, is clearly beyond what physics allows.
 bool IsImpossible(const Template& form, const Eigen::Ref<const Eigen::VectorXd>& b,
                   const Eigen::Ref<const Eigen::MatrixXd>& g);

@@ -59,9 +59,10 @@ void DropIfBeaten(const LastFirst& names, double family_wise, std::uint64_t seed
   Fit curved = without;
   curved.model.terms.push_back(left->term);
   FitAnew(&curved);
-  if (BetterBy(curved, *fit) <= Margin(names.size(), selection->tests, left->tests) ||
-      IsOneOf(names, *fit, without, curved))
-    return;
+  const double ahead = BetterBy(curved, *fit) - Margin(names.size(), selection->tests, left->tests);
+  if (IsOneOf(names, *fit, without, curved)) return;
+  for (const std::size_t name : names) selection->accepted[name].log_odds_of_curve = ahead / 2;
+  if (ahead <= 0) return;
   *fit = std::move(without);
   Erase(names, &selection->accepted);
 }

@@ -44,7 +44,7 @@ double ChiSquare(const Score& score, const Template& form, std::size_t unit) {
   const Eigen::Map<const Eigen::VectorXd> b(score.b.data() + unit * c, size);
   const Eigen::Map<const Eigen::MatrixXd> g(score.g.data() + unit * c * c, size, size);
   if (!(g.trace() > 0) || IsImpossible(form, b, g)) return 0;
-  return b.dot(g.completeOrthogonalDecomposition().solve(b));
+  return FitOwn(score, c, unit).chi_square;
 }
 
 Template BestOfAll(std::span<const Score> scores, std::span<const Template> tried,

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,6 +26,8 @@ struct Rival {
 struct Accepted {
   Evidence evidence;          // with the rest of the model in place
   std::vector<Rival> rivals;  // not separable by these data
+  // An empirical term's, in place of this and the other names of its axis; none: it was not tried.
+  std::optional<double> log_odds_of_curve = {};
 };
 
 struct SelectionRule {

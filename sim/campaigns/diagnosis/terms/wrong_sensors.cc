@@ -108,7 +108,7 @@ Usual UsualOf(const std::vector<double>& gains, const std::vector<char>& suspect
   if (some.empty()) return {};
   Usual usual{.middle = Median(some)};
   for (const double gain : some) away.push_back(std::abs(gain - usual.middle));
-  usual.spread = 1.4826 * Median(std::move(away));
+  usual.spread = kSigmaOfMedian * Median(std::move(away));
   return usual;
 }
 

@@ -45,6 +45,17 @@ TEST(Decide, NoStructureCastsDoubtOnWhatItCannotBe) {
   EXPECT_DOUBLE_EQ(DoubtOf(NameOf(1), {{{.size_um = 1e3, .casts_doubt = false}}}), kAlone);
 }
 
+TEST(Decide, ACurveThatDoesAsWellIsADoubt) {
+  const auto doubt = [](double log_odds_of_curve) {
+    CauseFound cause = NameOf(10);
+    cause.log_odds["unknown"] = log_odds_of_curve;
+    return DoubtOf(cause, {});
+  };
+  EXPECT_DOUBLE_EQ(doubt(0), 1 - (1 - kAlone) / 2);
+  EXPECT_NEAR(doubt(-kTemperature * std::log(9)), 1 - (1 - kAlone) * 0.9, 1e-12);
+  EXPECT_NEAR(doubt(-1e4), kAlone, 1e-12);
+}
+
 TEST(Decide, ANameThatMayBePartOfAStructureHasUnknownAsACandidate) {
   const Diagnosis diagnosis = Found({NameOf(50), NameOf(2)}, {{.size_um = 2}});
   EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown);

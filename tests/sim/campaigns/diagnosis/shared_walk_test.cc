@@ -25,33 +25,20 @@ Campaign Together(const std::function<double(double share_of_night)>& off_deg, s
   return campaign;
 }
 
-bool IsInDoubt(const Diagnosis& diagnosis) {
-  return diagnosis.verdict == Verdict::kUnknown || diagnosis.verdict == Verdict::kAmbiguous;
-}
-bool NamesForSure(const Diagnosis& diagnosis) {
-  return std::ranges::any_of(diagnosis.causes, [](const CauseFound& cause) {
-    return cause.cause != "zero_offset" && cause.candidates.size() == 1;
-  });
-}
-
 // Whatever else is said of it, no cause is named for sure.
 void ExpectNotSure(const Diagnosis& diagnosis) {
-  EXPECT_TRUE(IsInDoubt(diagnosis)) << Reported(diagnosis);
-  EXPECT_FALSE(NamesForSure(diagnosis)) << Reported(diagnosis);
+  EXPECT_TRUE(diagnosis.verdict == Verdict::kUnknown || diagnosis.verdict == Verdict::kAmbiguous)
+      << Reported(diagnosis);
+  for (const CauseFound& cause : diagnosis.causes)
+    EXPECT_TRUE(cause.cause == "zero_offset" || cause.candidates.size() > 1) << Reported(diagnosis);
 }
 
-// Wear of each unit's own comes within 20 in 2 ln L of one curve for all. In one of the three
-// campaigns the bend of the curve is self_heating for sure, beside wear that is none.
+// Wear of each unit's own comes within 20 in 2 ln L of one curve for all.
 TEST(SharedWalk, AZeroThatAllUnitsDriftByIsNotNoise) {
-  std::size_t sure = 0;
   for (const std::uint64_t seed : {3u, 4u, 5u}) {
     SCOPED_TRACE(seed);
-    const Diagnosis diagnosis =
-        Verdicts(Together([](double share) { return 0.05 * share * share; }, seed));
-    EXPECT_TRUE(IsInDoubt(diagnosis)) << Reported(diagnosis);
-    if (NamesForSure(diagnosis)) ++sure;
+    ExpectNotSure(Verdicts(Together([](double share) { return 0.05 * share * share; }, seed)));
   }
-  EXPECT_LE(sure, 1u);
 }
 
 TEST(SharedWalk, NorOneThatStepsOnce) {
