@@ -18,46 +18,106 @@ enum class StepKind { kTurns, kCommand, kBlocked };
 StepKind KindOf(const Fit& fit, const EventTerm& event) {
   const double step = fit.facts->step_deg[event.axis][event.row];
   if (std::abs(std::abs(event.step_deg) - std::abs(step)) < 1e-9) return StepKind::kCommand;
-  const double turns = event.step_deg * fit.model.units[event.unit].gear[event.axis] / 360;
-  return std::abs(turns - std::round(turns)) < 1e-6 ? StepKind::kTurns : StepKind::kBlocked;
+  return IsSlip(fit, event) ? StepKind::kTurns : StepKind::kBlocked;
+}
+
+// Steps of the model that are slips, of all units.
+std::vector<EventTerm> SlipsOf(const Fit& fit) {
+  std::vector<EventTerm> slips;
+  for (const EventTerm& event : fit.model.events)
+    if (KindOf(fit, event) == StepKind::kTurns) slips.push_back(event);
+  return slips;
+}
+
+// What a look finds in a unit.
+struct UnitSteps {
+  std::vector<EventTerm> found;
+  std::vector<EventTerm> replaced = {};  // steps of the model that go
+};
+
+UnitSteps SlipsByCount(const Fit& fit, std::size_t unit, std::span<const EventTerm> known,
+                       double price_of_other) {
+  const SlipPrices prices = PricesByCount(fit, known, unit);
+  auto anew = SlipsAnew(fit, unit, prices, price_of_other);
+  if (!anew) return {.found = FindSlips(fit, unit, prices, false)};
+  UnitSteps steps{.found = std::move(*anew)};
+  for (const EventTerm& event : fit.model.events)
+    if (event.unit == unit) steps.replaced.push_back(event);
+  return steps;
+}
+
+// Exchanges what goes for what was found, and returns the number of changes. Steps of an axis in
+// one move are one step.
+std::size_t TakeSteps(std::vector<UnitSteps>* of_unit, std::vector<EventTerm>* events) {
+  std::size_t changes = 0;
+  const auto is_same = [](const EventTerm& a, const EventTerm& b) {
+    return a.unit == b.unit && a.row == b.row && a.axis == b.axis && a.stays == b.stays;
+  };
+  for (UnitSteps& steps : *of_unit) {
+    for (const EventTerm& gone : steps.replaced)
+      changes += std::erase_if(*events, [&](const EventTerm& one) { return is_same(one, gone); });
+    for (const EventTerm& found : steps.found) {
+      ++changes;
+      const auto same =
+          std::ranges::find_if(*events, [&](const EventTerm& one) { return is_same(one, found); });
+      if (same == events->end())
+        events->push_back(found);
+      else
+        same->step_deg += found.step_deg;
+    }
+    steps = {};
+  }
+  constexpr double kRounding_deg = 1e-9;
+  std::erase_if(*events,
+                [](const EventTerm& one) { return std::abs(one.step_deg) < kRounding_deg; });
+  return changes;
 }
 
 }  // namespace
 
 std::size_t AddEvents(double family_wise, Fit* fit) {
   const std::size_t units = fit->model.units.size();
-  std::vector<std::vector<EventTerm>> of_unit(units);
+  std::vector<UnitSteps> of_unit(units);
   std::vector<CampaignUnit> geometry = fit->model.units;
   const std::vector<UnitChunk> chunks = ChunksOf(units);
+  const auto each_unit = [&](const auto& find) {
+    fit->parallel(chunks.size(), [&](std::size_t chunk) {
+      for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
+        of_unit[unit] = find(unit);
+    });
+  };
   const auto take = [&] {
-    std::size_t added = 0;
-    for (auto& events : of_unit) {
-      for (const EventTerm& event : events) fit->model.events.push_back(event), ++added;
-      events.clear();
-    }
-    if (added == 0) return added;
+    const std::size_t changes = TakeSteps(&of_unit, &fit->model.events);
+    if (changes == 0) return changes;
     fit->model.units = geometry;
     UpdateResiduals(fit);
     SettleFit(fit, 3);
-    return added;
+    return changes;
   };
-  fit->parallel(chunks.size(), [&](std::size_t chunk) {
-    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
-      of_unit[unit] = ExactSteps(*fit, unit, &geometry[unit]);
+  each_unit([&](std::size_t unit) {
+    return UnitSteps{.found = ExactSteps(*fit, unit, &geometry[unit])};
   });
-  std::size_t added = take();
-  constexpr int kRounds = 4;
+  take();
+  // Slips make the noise of the others: each round finds those that it had hidden. The last ones
+  // are found by how often the units slip.
+  constexpr int kRounds = 12;
+  const SlipPrices of_first = PricesOfFirst(*fit, family_wise);
+  bool by_count = false;
   for (int round = 0; round < kRounds; ++round) {
     geometry = fit->model.units;
-    fit->parallel(chunks.size(), [&](std::size_t chunk) {
-      for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
-        of_unit[unit] = FindSlips(*fit, unit, family_wise);
-    });
-    const std::size_t slips = take();
-    added += slips;
-    if (slips == 0) break;
+    if (by_count)
+      each_unit([&, known = SlipsOf(*fit)](std::size_t unit) {
+        return SlipsByCount(*fit, unit, known, of_first[kTheta][0]);
+      });
+    else
+      each_unit([&](std::size_t unit) {
+        return UnitSteps{.found = FindSlips(*fit, unit, of_first, true)};
+      });
+    if (take() > 0) continue;
+    if (by_count || SlipsOf(*fit).empty()) break;
+    by_count = true;
   }
-  return added;
+  return fit->model.events.size();
 }
 
 namespace {
