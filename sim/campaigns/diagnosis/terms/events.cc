@@ -8,6 +8,7 @@
 
 #include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/terms/exact_steps.h"
+#include "sim/campaigns/diagnosis/terms/lost_moves.h"
 #include "sim/campaigns/diagnosis/terms/slips.h"
 
 namespace focalfleet::sim {
@@ -16,8 +17,7 @@ namespace {
 enum class StepKind { kTurns, kCommand, kBlocked };
 
 StepKind KindOf(const Fit& fit, const EventTerm& event) {
-  const double step = fit.facts->step_deg[event.axis][event.row];
-  if (std::abs(std::abs(event.step_deg) - std::abs(step)) < 1e-9) return StepKind::kCommand;
+  if (IsCommand(fit, event)) return StepKind::kCommand;
   return IsSlip(fit, event) ? StepKind::kTurns : StepKind::kBlocked;
 }
 
@@ -29,7 +29,15 @@ std::vector<EventTerm> SlipsOf(const Fit& fit) {
   return slips;
 }
 
-// What a look finds in a unit.
+// Moves that were not made.
+std::size_t LostMovesOf(const Fit& fit) {
+  std::set<std::size_t> rows;
+  for (const EventTerm& event : fit.model.events)
+    if (KindOf(fit, event) == StepKind::kCommand) rows.insert(event.row);
+  return rows.size();
+}
+
+// Steps that a look finds in a unit.
 struct UnitSteps {
   std::vector<EventTerm> found;
   std::vector<EventTerm> replaced = {};  // steps of the model that go
@@ -40,6 +48,15 @@ UnitSteps SlipsByCount(const Fit& fit, std::size_t unit, std::span<const EventTe
   const SlipPrices prices = PricesByCount(fit, known, unit);
   auto anew = SlipsAnew(fit, unit, prices, price_of_other);
   if (!anew) return {.found = FindSlips(fit, unit, prices, false)};
+  UnitSteps steps{.found = std::move(*anew)};
+  for (const EventTerm& event : fit.model.events)
+    if (event.unit == unit) steps.replaced.push_back(event);
+  return steps;
+}
+
+UnitSteps LostByCount(const Fit& fit, std::size_t unit, double price, double price_of_other) {
+  auto anew = LostMovesAnew(fit, unit, price, price_of_other);
+  if (!anew) return {.found = FindLostMoves(fit, unit, price)};
   UnitSteps steps{.found = std::move(*anew)};
   for (const EventTerm& event : fit.model.events)
     if (event.unit == unit) steps.replaced.push_back(event);
@@ -116,6 +133,15 @@ std::size_t AddEvents(double family_wise, Fit* fit) {
     if (take() > 0) continue;
     if (by_count || SlipsOf(*fit).empty()) break;
     by_count = true;
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    const std::size_t known = LostMovesOf(*fit);
+    if (known == 0) break;
+    geometry = fit->model.units;
+    each_unit([&, price = PriceOfLostMove(*fit, known)](std::size_t unit) {
+      return LostByCount(*fit, unit, price, of_first[kTheta][0]);
+    });
+    if (take() == 0) break;
   }
   return fit->model.events.size();
 }

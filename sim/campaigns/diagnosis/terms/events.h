@@ -17,7 +17,7 @@ namespace focalfleet::sim {
 /// The amplitude's unit of a cause that is made of steps.
 inline constexpr std::string_view kEvents = "events";
 
-/// Adds the steps that are clear in the residuals to the model. Returns the model's number of steps.
+/// Adds the steps that are clear in the residuals to the model. Returns its number of steps.
 std::size_t AddEvents(double family_wise, Fit* fit);
 
 /// Whether a neighbour was stopped in the same move, and one of the two not after whole turns.

@@ -8,135 +8,16 @@
 #include <span>
 #include <utility>
 
-#include "sim/campaigns/diagnosis/score/unit_scorer.h"
+#include "sim/campaigns/diagnosis/terms/step_rows.h"
 
 namespace focalfleet::sim {
 namespace {
 
 constexpr std::size_t kSlipsOfUnitMax = 40;
-// The probability from which a slip is taken, where others are known: as that of a name.
-constexpr double kSure = 0.9;
 // Share of a turn by which a step may lie beside a whole number of turns, either way. Chance passes
 // half of all steps. With 0.125 one of nine slips of a unit is taken for one of the other axis;
 // with 0.5 every step passes, and steps that are none are taken again and again.
 constexpr double kBeside = 0.25;
-
-// Columns of a row, side by side: the geometry's, and the residual.
-constexpr Eigen::Index kGeometryColumns = 6, kStepColumns = kGeometryColumns + 1;
-using StepProducts = Eigen::Matrix<double, kStepColumns, kStepColumns>;
-
-// A unit's whitened residuals beside its geometry, and what steps make of them.
-class StepRows {
- public:
-  StepRows(const Fit& fit, std::size_t unit)
-      : white_(Whiten(fit, unit)), geometry_(white_.y.size()), y_(white_.y) {
-    for (Eigen::Index c = 0; c < white_.geometry.cols(); ++c) geometry_.Add(white_.geometry.col(c));
-    geometry_.Remove(&y_);
-    AddUp();
-  }
-
-  [[nodiscard]] const UnitTrack& track() const { return white_.track; }
-  [[nodiscard]] std::size_t rows() const { return white_.moves.size(); }
-  [[nodiscard]] std::size_t move(std::size_t row) const { return white_.moves[row]; }
-
-  /// The trace of a step by one degree in `move`, until the next homing.
-  [[nodiscard]] Eigen::VectorXd Column(std::size_t axis, std::size_t move, bool stays) const {
-    Eigen::VectorXd column = Eigen::VectorXd::Zero(y_.size());
-    const std::size_t end = stays ? EndOfStep(white_.track, move) : move + 1;
-    for (std::size_t k = 0; k < rows(); ++k) {
-      if (white_.moves[k] < move || white_.moves[k] >= end) continue;
-      for (std::size_t xy = 0; xy < 2; ++xy)
-        column[static_cast<Eigen::Index>(2 * k + xy)] = white_.turn_um[4 * k + 2 * axis + xy];
-    }
-    white_.Apply(column.data());
-    geometry_.Remove(&column);
-    return column;
-  }
-  struct Jump {
-    double b = 0, g = 0;
-  };
-  /// A step of one degree of each axis before a row, by at most `either_side` rows on each side: b
-  /// and g with the geometry free in these rows alone. A unit's geometry is bent by the steps that
-  /// are not found yet; free here, it takes nothing from a jump.
-  [[nodiscard]] std::array<Jump, 2> JumpsAt(std::size_t row, std::size_t either_side,
-                                            double least) const {
-    std::size_t begin = row - std::min(row, either_side);
-    std::size_t end = std::min(rows(), row + either_side);
-    // Rows of other histories tell nothing of this one.
-    while (EndOfStep(white_.track, move(begin)) <= move(row - 1)) ++begin;
-    while (EndOfStep(white_.track, move(row)) <= move(end - 1)) --end;
-    const StepProducts all = sums_[end] - sums_[begin];
-    Eigen::Matrix<double, kGeometryColumns, kGeometryColumns> gram =
-        all.topLeftCorner<kGeometryColumns, kGeometryColumns>();
-    // Share of each column's square, above rounding. Half and double of it find the same slips.
-    constexpr double kDependent = 1e-9;
-    gram.diagonal() += kDependent * gram.diagonal();
-    gram.diagonal().array() += 1e-300;  // a column of zeros
-    const auto solver = gram.ldlt();
-    const Eigen::Matrix<double, kGeometryColumns, 1> level =
-        solver.solve(all.block<kGeometryColumns, 1>(0, kGeometryColumns));
-    const double square = all(kGeometryColumns, kGeometryColumns) -
-                          level.dot(all.block<kGeometryColumns, 1>(0, kGeometryColumns));
-    if (square / 2 <= least) return {};
-    const auto at = static_cast<Eigen::Index>(2 * row);
-    const auto size = static_cast<Eigen::Index>(2 * (end - row));
-    const auto geometry = white_.geometry.middleRows(at, size);
-    std::array<Jump, 2> jumps;
-    for (const std::size_t axis : {kTheta, kPhi}) {
-      const Eigen::VectorXd column = Behind(axis, row, end);
-      Eigen::Matrix<double, kGeometryColumns, 1> with =
-          Eigen::Matrix<double, kGeometryColumns, 1>::Zero();
-      with.head(geometry.cols()) = geometry.transpose() * column;
-      jumps[axis] = {column.dot(y_.segment(at, size)) - with.dot(level),
-                     column.squaredNorm() - with.dot(solver.solve(with))};
-    }
-    return jumps;
-  }
-  /// The first row from this one on that would show a turn of the axis, above its noise, within the
-  /// same history. Folded arms do not show where theta stands.
-  [[nodiscard]] std::size_t RowThatShows(std::size_t axis, std::size_t row) const {
-    const double turn = 360 / white_.track.unit->gear[axis];
-    const std::size_t end = EndOfStep(white_.track, move(row));
-    while (row + 1 < rows() && move(row + 1) < end && turn * Behind(axis, row, row + 1).norm() < 1)
-      ++row;
-    return row;
-  }
-  [[nodiscard]] const Eigen::VectorXd& left() const { return y_; }
-  void Take(const Eigen::VectorXd& column, double step_deg) {
-    y_ -= step_deg * column;
-    AddUp();
-  }
-
- private:
-  // A step of one degree as the rows from `row` to `end` show it, whitened.
-  [[nodiscard]] Eigen::VectorXd Behind(std::size_t axis, std::size_t row, std::size_t end) const {
-    Eigen::VectorXd column(static_cast<Eigen::Index>(2 * (end - row)));
-    for (std::size_t k = row; k < end; ++k)
-      for (std::size_t xy = 0; xy < 2; ++xy)
-        column[static_cast<Eigen::Index>(2 * (k - row) + xy)] =
-            white_.turn_um[4 * k + 2 * axis + xy];
-    ApplyFilter(std::span(white_.filter).subspan(row, end - row),
-                std::span(white_.turn_um).subspan(4 * row, 4 * (end - row)), column.data());
-    return column;
-  }
-  // Sums of the columns' products over all rows before each.
-  void AddUp() {
-    sums_.assign(1, StepProducts::Zero());
-    for (std::size_t k = 0; k < rows(); ++k) {
-      Eigen::Matrix<double, 2, kStepColumns> columns =
-          Eigen::Matrix<double, 2, kStepColumns>::Zero();
-      const auto at = static_cast<Eigen::Index>(2 * k);
-      columns.leftCols(white_.geometry.cols()) = white_.geometry.middleRows<2>(at);
-      columns.col(kGeometryColumns) = y_.segment<2>(at);
-      sums_.push_back(sums_.back() + columns.transpose() * columns);
-    }
-  }
-
-  WhiteUnit white_;
-  Basis geometry_;
-  Eigen::VectorXd y_;
-  std::vector<StepProducts> sums_;  // Shape: (rows + 1)
-};
 
 constexpr std::size_t kNoMove = std::numeric_limits<std::size_t>::max();
 
@@ -158,15 +39,18 @@ struct Slip {
   double above = 0;  // its price, in ln of the likelihood ratio
 };
 
-// What a slip has to exceed, and where it may be.
+// The prices of slips, and how one is tried.
 struct SlipRule {
   const SlipPrices& prices;
   double scale = 1;  // of the prices
 
   // Takes a step of the axis by b / g, in the moves from one to another, if it is a better slip.
-  void Try(const StepRows& rows, std::size_t axis, const StepRows::Jump& jump, std::size_t from,
+  struct AxisScore {
+    double b = 0, g = 0;
+  };
+  void Try(const StepRows& rows, std::size_t axis, AxisScore score, std::size_t from,
            std::size_t to, Slip* best) const {
-    const auto [b, g] = jump;
+    const auto [b, g] = score;
     if (!(g > 0)) return;
     const double turn = 360 / rows.track().unit->gear[axis];
     const double turns = std::round(b / g / turn), step_deg = turns * turn;
@@ -181,20 +65,6 @@ struct SlipRule {
   }
 };
 
-// Rows on either side that a jump is looked for by. The narrowest that shows a slip has the fewest
-// other slips within it: narrowest over threshold, Baranowski et al., J. R. Stat. Soc. B 81, 649.
-// With half of these rows eight of nine slips of a unit are found, with twice as many all nine.
-constexpr std::array<std::size_t, 3> kEitherSide = {4, 8, 16};
-
-// The first move after the last homing up to this row, or after the row before it.
-std::size_t BeginBefore(const StepRows& rows, std::size_t row) {
-  std::size_t begin = rows.move(row - 1) + 1;
-  for (std::size_t end = EndOfHistory(rows.track(), rows.move(row - 1)); end <= rows.move(row);
-       end = EndOfHistory(rows.track(), end))
-    begin = end;
-  return begin;
-}
-
 // The slip that is farthest above its price, by as few rows as show one. A slip before the first
 // row that is seen after a homing shows beside the rows before the homing.
 Slip BestSlip(const StepRows& rows, const SlipRule& rule) {
@@ -203,9 +73,9 @@ Slip BestSlip(const StepRows& rows, const SlipRule& rule) {
   Slip best;
   for (const std::size_t either_side : kEitherSide) {
     for (std::size_t k = 1; k < rows.rows(); ++k) {
-      const std::array<StepRows::Jump, 2> jumps = rows.JumpsAt(k, either_side, best.above + least);
+      const StepRows::Jump jump = rows.JumpAt(k, either_side, best.above + least);
       for (const std::size_t axis : {kTheta, kPhi})
-        rule.Try(rows, axis, jumps[axis], BeginBefore(rows, k),
+        rule.Try(rows, axis, {jump.b[axis], jump.g[axis][axis]}, rows.MoveAfterRow(k),
                  rows.move(rows.RowThatShows(axis, k)), &best);
     }
     if (best.move != kNoMove) break;
@@ -271,7 +141,7 @@ SlipPrices PricesByCount(const Fit& fit, std::span<const EventTerm> known, std::
     for (std::size_t k = 0; k < prices[axis].size(); ++k) {
       const double of_size = (of_turns[k] + 0.5) / (count + 0.5 * kSlipTurnsMax);
       const double of_this_axis = (of_axis[axis] + 0.5) / (count + 1);
-      prices[axis][k] = std::log(kSure / (1 - kSure)) -
+      prices[axis][k] = std::log(kSureOfStep / (1 - kSureOfStep)) -
                         std::log(slips_at_all * rate * of_this_axis * of_size) +
                         std::log(static_cast<double>(kEitherSide.size()));
     }
@@ -285,8 +155,8 @@ class TakenSlips {
  public:
   TakenSlips(StepRows* rows, const SlipRule& rule) : rows_(*rows), rule_(rule) {}
 
-  /// Takes slips, one after the other, and looks at each once more beside all others: one that was
-  /// told by few rows may be another one by all.
+  /// Takes slips, one after the other, and looks at each once more beside all others: one that few
+  /// rows showed may be another one by all.
   void Find() {
     while (slips_.size() < kSlipsOfUnitMax) {
       const Slip slip = BestSlip(rows_, rule_);
@@ -324,7 +194,7 @@ class TakenSlips {
   [[nodiscard]] Slip BestByAll() const {
     Slip best;
     for (std::size_t k = 0; k < rows_.rows(); ++k) {
-      const std::size_t from = k == 0 ? 0 : BeginBefore(rows_, k);
+      const std::size_t from = k == 0 ? 0 : rows_.MoveAfterRow(k);
       for (const std::size_t axis : {kTheta, kPhi}) {
         const Eigen::VectorXd column = rows_.Column(axis, rows_.move(k), true);
         rule_.Try(rows_, axis, {column.dot(rows_.left()), column.squaredNorm()}, from,

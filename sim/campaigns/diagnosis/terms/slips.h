@@ -17,10 +17,13 @@
 
 namespace focalfleet::sim {
 
+/// The probability from which a step is taken, where others like it are known: as that of a name.
+inline constexpr double kSureOfStep = 0.9;
+
 /// Turns that a rotor may lose at once, at most.
 inline constexpr int kSlipTurnsMax = 20;
 
-/// What the log likelihood ratio of a slip has to exceed. Shape: (axes, turns less one).
+/// The log likelihood ratio that a slip has to exceed. Shape: (axes, turns less one).
 using SlipPrices = std::array<std::array<double, kSlipTurnsMax>, 2>;
 
 /// The prices where no slip is known, so that any unit of the campaign has one by chance in this
