@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <span>
+#include <utility>
 
 #include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/terms/exact_steps.h"
@@ -43,24 +45,26 @@ struct UnitSteps {
   std::vector<EventTerm> replaced = {};  // steps of the model that go
 };
 
+// Steps in place of all that the model has of the unit.
+UnitSteps InPlaceOfAll(const Fit& fit, std::size_t unit, std::vector<EventTerm> steps) {
+  UnitSteps exchange{.found = std::move(steps)};
+  for (const EventTerm& event : fit.model.events)
+    if (event.unit == unit) exchange.replaced.push_back(event);
+  return exchange;
+}
+
 UnitSteps SlipsByCount(const Fit& fit, std::size_t unit, std::span<const EventTerm> known,
                        double price_of_other) {
   const SlipPrices prices = PricesByCount(fit, known, unit);
-  auto anew = SlipsAnew(fit, unit, prices, price_of_other);
-  if (!anew) return {.found = FindSlips(fit, unit, prices, false)};
-  UnitSteps steps{.found = std::move(*anew)};
-  for (const EventTerm& event : fit.model.events)
-    if (event.unit == unit) steps.replaced.push_back(event);
-  return steps;
+  if (auto anew = SlipsAnew(fit, unit, prices, price_of_other))
+    return InPlaceOfAll(fit, unit, std::move(*anew));
+  return {.found = FindSlips(fit, unit, prices, false)};
 }
 
 UnitSteps LostByCount(const Fit& fit, std::size_t unit, double price, double price_of_other) {
-  auto anew = LostMovesAnew(fit, unit, price, price_of_other);
-  if (!anew) return {.found = FindLostMoves(fit, unit, price)};
-  UnitSteps steps{.found = std::move(*anew)};
-  for (const EventTerm& event : fit.model.events)
-    if (event.unit == unit) steps.replaced.push_back(event);
-  return steps;
+  if (auto anew = LostMovesAnew(fit, unit, price, price_of_other))
+    return InPlaceOfAll(fit, unit, std::move(*anew));
+  return {.found = FindLostMoves(fit, unit, price)};
 }
 
 // Exchanges what goes for what was found, and returns the number of changes. Steps of an axis in

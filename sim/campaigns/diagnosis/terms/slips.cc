@@ -191,17 +191,23 @@ class TakenSlips {
     return slip;
   }
   // The best slip by all rows of its history.
-  [[nodiscard]] Slip BestByAll() const {
+  [[nodiscard]] Slip BestByAll() {
+    if (before_row_.empty()) LookBeforeRows();
     Slip best;
-    for (std::size_t k = 0; k < rows_.rows(); ++k) {
-      const std::size_t from = k == 0 ? 0 : rows_.MoveAfterRow(k);
-      for (const std::size_t axis : {kTheta, kPhi}) {
-        const Eigen::VectorXd column = rows_.Column(axis, rows_.move(k), true);
-        rule_.Try(rows_, axis, {column.dot(rows_.left()), column.squaredNorm()}, from,
-                  rows_.move(rows_.RowThatShows(axis, k)), &best);
-      }
-    }
+    for (const BeforeRow& one : before_row_)
+      rule_.Try(rows_, one.axis, {one.column.dot(rows_.left()), one.square}, one.from, one.to,
+                &best);
     return best;
+  }
+  // The columns are the same however many slips are taken.
+  void LookBeforeRows() {
+    for (std::size_t k = 0; k < rows_.rows(); ++k)
+      for (const std::size_t axis : {kTheta, kPhi}) {
+        Eigen::VectorXd column = rows_.Column(axis, rows_.move(k), true);
+        const double square = column.squaredNorm();
+        before_row_.push_back({axis, std::move(column), square, k == 0 ? 0 : rows_.MoveAfterRow(k),
+                               rows_.move(rows_.RowThatShows(axis, k))});
+      }
   }
   // Exchanges each slip for the one that does best in its place, or drops it. True: any was.
   bool Exchange() {
@@ -237,10 +243,19 @@ class TakenSlips {
     return false;
   }
 
+  // A step before a row, by all rows, and the moves in which it may have been.
+  struct BeforeRow {
+    std::size_t axis = kTheta;
+    Eigen::VectorXd column;
+    double square = 0;
+    std::size_t from = 0, to = 0;
+  };
+
   static constexpr double kRounding = 1e-6;
   StepRows& rows_;
   SlipRule rule_;
   std::vector<Slip> slips_;
+  std::vector<BeforeRow> before_row_;
 };
 
 std::vector<EventTerm> EventsOf(const std::vector<Slip>& slips, std::size_t unit,
