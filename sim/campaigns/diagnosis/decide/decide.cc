@@ -88,7 +88,11 @@ double DoubtOf(const CauseFound& cause, std::span<const UnknownFound> unknown) {
   constexpr double kWrong = 13, kSets = 285;
   constexpr double kAlone = (kWrong + 0.5) / (kSets + 1);  // the mean of Jeffreys' posterior
   if (TraitsOf(cause.cause).is_static) return 0;  // no other cause is like it, and none was wrong
-  return 1 - (1 - kAlone) * (1 - DoubtBeside(cause, unknown)) * (1 - DoubtByCurve(cause));
+  // Where an amplitude meets its bound, half of its likelihood or more is beyond what physics
+  // allows. Among 162 single names in 267 campaigns of another author one was so, and it was wrong.
+  const double of_bound = cause.bound_share / 2;
+  return 1 - (1 - kAlone) * (1 - DoubtBeside(cause, unknown)) * (1 - DoubtByCurve(cause)) *
+                 (1 - of_bound);
 }
 
 std::vector<double> PosteriorOf(const CauseFound& cause) {

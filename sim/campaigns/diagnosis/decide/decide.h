@@ -26,7 +26,8 @@ inline constexpr double kTemperature = 2.3;
 /// The probability that none of the cause's names is right, beside these unknown structures: 0 for
 /// geometry, and 5 % where nothing is unknown. Beside a structure of size u a name of size n is in
 /// doubt by u / (u + n) more (docs/diagnosis.md, Reliability). Where an empirical term was tried in
-/// place of the name (log_odds has "unknown"), its probability is a doubt, too.
+/// place of the name (log_odds has "unknown"), its probability is a doubt, too, and half of the
+/// share of amplitudes that are as large as physics allows.
 double DoubtOf(const CauseFound& cause, std::span<const UnknownFound> unknown);
 
 /// The probability of each candidate. "unknown" has the cause's doubt, which is otherwise the rest

@@ -34,7 +34,8 @@ struct CauseFound {
   double amplitude = 0;
   std::string amplitude_unit;
   double ci95[2] = {0, 0};
-  bool at_bound = false;  // the amplitude is as large as physics allows
+  bool at_bound = false;   // an amplitude is as large as physics allows
+  double bound_share = 0;  // share of the amplitudes that are
   // Log odds of candidates against the cause, 0 where the data say nothing of it.
   std::map<std::string, double> log_odds;
   double doubt = 0;    // probability that none of the names is the cause

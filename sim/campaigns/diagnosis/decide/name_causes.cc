@@ -59,8 +59,12 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   cause.ci95[0] = amplitude.value - 1.96 * sigma;
   cause.ci95[1] = amplitude.value + 1.96 * sigma;
   const auto [low, high] = RangeOfAmplitude(effect);
-  cause.at_bound = std::ranges::any_of(
+  const auto at_bound = std::ranges::count_if(
       term.amplitude, [&](double one) { return (low < 0 && one <= low) || one >= high; });
+  cause.at_bound = at_bound > 0;
+  // Units that do not have the effect have an amplitude of zero.
+  const auto there = std::ranges::count_if(term.amplitude, [](double one) { return one != 0; });
+  if (at_bound > 0) cause.bound_share = static_cast<double>(at_bound) / static_cast<double>(there);
   const TermTrace trace = TraceOf(fit, term);
   // No error moves a fibre farther than across its patrol disc.
   double disc_um = 0;

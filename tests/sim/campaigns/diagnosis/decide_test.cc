@@ -56,6 +56,16 @@ TEST(Decide, ACurveThatDoesAsWellIsADoubt) {
   EXPECT_NEAR(doubt(-1e4), kAlone, 1e-12);
 }
 
+TEST(Decide, AnAmplitudeAsLargeAsPhysicsAllowsIsADoubt) {
+  const auto doubt = [](double share) {
+    CauseFound cause = NameOf(10);
+    cause.bound_share = share;
+    return DoubtOf(cause, {});
+  };
+  EXPECT_DOUBLE_EQ(doubt(1), 1 - (1 - kAlone) / 2);
+  EXPECT_DOUBLE_EQ(doubt(0.1), 1 - (1 - kAlone) * 0.95);
+}
+
 TEST(Decide, ANameThatMayBePartOfAStructureHasUnknownAsACandidate) {
   const Diagnosis diagnosis = Found({NameOf(50), NameOf(2)}, {{.size_um = 2}});
   EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown);
