@@ -39,6 +39,7 @@ class LineExchange {
   /// Accepts, reads and writes as much as goes without waiting. Urgent lines are appended.
   virtual void Service(std::vector<IncomingLine>* urgent) = 0;
   virtual std::optional<IncomingLine> Next() = 0;
+  [[nodiscard]] virtual bool connected(ClientId client) const = 0;
   /// Queues the last answer to a line of this client. False: the client is gone.
   virtual bool Answer(ClientId client, std::string_view line) = 0;
   /// Queues a line before the last answer. False: the client is gone.

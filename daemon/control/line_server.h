@@ -89,7 +89,7 @@ class LineServer final : public LineExchange {
   /// client is gone.
   bool Progress(ClientId client, std::string_view line) override;
 
-  [[nodiscard]] bool connected(ClientId client) const;
+  [[nodiscard]] bool connected(ClientId client) const override;
   [[nodiscard]] std::size_t clients() const;
   [[nodiscard]] const std::string& path() const;
 

@@ -105,10 +105,12 @@ void Shell::Step() {
   const std::optional<Error> failure = parts_.store->failure();
   if (store_.failing != failure.has_value()) {
     parts_.alarms->NoteStore(parts_.clock.Wall(), failure);
-    // Other failures are logged by the writer, whose thread now waits for the disk.
-    if (failure && parts_.store->hangs())
-      spdlog::error("the store cannot be written, nothing new is started: {}", failure->text);
   }
+  // Other failures are logged by the writer, whose thread now waits for the disk.
+  if (const bool hangs = parts_.store->hangs(); std::exchange(store_.hangs, hangs) != hangs)
+    spdlog::log(hangs ? spdlog::level::err : spdlog::level::info, "the disk {}",
+                hangs ? "does not answer: the store cannot be written, nothing new is started"
+                      : "answers again");
   store_.failing = failure.has_value();
   store_.committed_through = parts_.store->committed_through();
   const std::vector<RefusedRow> refused = parts_.store->TakeRefused();

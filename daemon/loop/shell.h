@@ -132,6 +132,7 @@ class Shell {
   struct StoreFacts {
     std::uint64_t committed_through = 0;
     bool failing = false;
+    bool hangs = false;
   } store_;
   Effects effects_;
   std::uint64_t last_batch_ = 0;

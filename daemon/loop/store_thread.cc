@@ -32,14 +32,18 @@ StoreThread::~StoreThread() {
 
 Status StoreThread::Finish() {
   constexpr std::chrono::milliseconds kLook{1};
-  while (writer_.held() > 0 && !writer_.failing()) {
-    writer_.HandOver();
+  while (!ended_) {
+    if (writer_.hangs())
+      return tl::unexpected<Error>(writer_.failure().value_or(
+          Error{ErrorCode::kUnavailable, "the disk did not answer for too long"}));
+    if (writer_.held() > 0 && !writer_.failing()) {
+      writer_.HandOver();
+    } else if (!ending_.exchange(true)) {  // not before: a thread that has nothing left ends
+      wake_.Raise();
+    }
     std::this_thread::sleep_for(kLook);
   }
-  ending_ = true;  // not before: a thread that has nothing left ends
-  wake_.Raise();
-  while (!ended_ && !writer_.hangs()) std::this_thread::sleep_for(kLook);
-  if (ended_) thread_.join();
+  thread_.join();
   const auto failure = writer_.failure();
   if (!failure && writer_.held() == 0) return {};
   return tl::unexpected<Error>(failure.value_or(Error{}));

@@ -79,9 +79,16 @@ std::optional<Error> StoreWriter::failure() const {
   return failing_ ? std::optional(last_error_) : std::nullopt;
 }
 
+/// From here on in_disk() answers for the thread. A question that came just before has its answer,
+/// too.
+void StoreWriter::EnterDisk() {
+  call_began_ns_ = sinks_.monotonic_ns();
+  sinks_.alive();
+}
+
 bool StoreWriter::hangs() const {
-  const std::int64_t began_ns = commit_began_ns_;
-  return began_ns != kNoCommit && sinks_.monotonic_ns() - began_ns >= NsOf(sinks_.hangs_after);
+  const std::int64_t began_ns = call_began_ns_;
+  return began_ns != kNoCall && sinks_.monotonic_ns() - began_ns >= NsOf(sinks_.hangs_after);
 }
 
 // ---- turns
@@ -129,9 +136,9 @@ bool StoreWriter::TryCommit(bool ending) {
     if (const char* const flaw = Flaw(open_.rows[k])) SetAside(k, flaw);
   while (!open_.rows.empty()) {
     std::size_t refused = open_.rows.size();
-    commit_began_ns_ = sinks_.monotonic_ns();
+    EnterDisk();
     const Status done = sinks_.commit(open_.rows, open_.at, &refused);
-    commit_began_ns_ = kNoCommit;
+    call_began_ns_ = kNoCall;
     if (done) break;
     const bool for_ever = done.error().code == ErrorCode::kInvalid && refused < open_.rows.size();
     if (!for_ever) {
@@ -192,7 +199,9 @@ void StoreWriter::NoteFailure(const Error& error) {
 bool StoreWriter::KeepUp() {
   const std::int64_t now_ns = sinks_.monotonic_ns();
   if (now_ns < upkeep_at_ns_) return false;
+  EnterDisk();
   const bool more = sinks_.upkeep();
+  call_began_ns_ = kNoCall;
   upkeep_at_ns_ = more ? now_ns : now_ns + NsOf(sinks_.upkeep_period);
   return more;
 }

@@ -48,15 +48,15 @@ class StoreWriter {
     std::function<void(const AlarmValue&)> alarm;
     std::function<void(const std::string&)> log_error;
     std::function<void(const std::string&)> log_info;
-    /// Called in each turn.
+    /// Called in each turn, and before each call of the disk.
     std::function<void()> alive = [] {};
     /// A piece of upkeep that takes no longer than a commit does. True: more is due. Called where
     /// no rows wait, once an upkeep_period or as long as more is due.
     std::function<bool()> upkeep = [] { return false; };
     std::chrono::milliseconds retry_period{1000};
-    /// The time of a commit from which it hangs. A disk that is well flushes within a second, and a
-    /// slow one within some. With half of it such a disk would stop commands now and then; with
-    /// twice as much they would wait as long for nothing.
+    /// The time of a commit, or of a piece of upkeep, from which it hangs. A disk that is well
+    /// flushes within a second, and a slow one within some. With half of it such a disk would stop
+    /// commands now and then; with twice as much they would wait as long for nothing.
     std::chrono::milliseconds hangs_after{10'000};
     std::chrono::milliseconds upkeep_period{3'600'000};
     std::function<std::int64_t()> monotonic_ns = &ReadMonotonicNs;
@@ -82,7 +82,9 @@ class StoreWriter {
 
   [[nodiscard]] std::uint64_t committed_through() const { return committed_through_; }
   [[nodiscard]] bool failing() const { return failing_ || hangs(); }
-  /// The commit that is under way takes longer than `hangs_after`.
+  /// A turn waits for the disk.
+  [[nodiscard]] bool in_disk() const { return call_began_ns_ != kNoCall; }
+  /// A turn has waited for the disk for longer than `hangs_after`.
   [[nodiscard]] bool hangs() const;
   /// Why the last attempt to commit failed or does not end; none: it did not fail, and none hangs.
   [[nodiscard]] std::optional<Error> failure() const;
@@ -118,9 +120,10 @@ class StoreWriter {
     std::size_t bytes = 0;  // of all its rows, also of those that were set aside since
   };
 
-  static constexpr std::int64_t kNoCommit = INT64_MAX;
+  static constexpr std::int64_t kNoCall = INT64_MAX;
 
   void Gather();
+  void EnterDisk();
   bool TryCommit(bool ending);
   void SetAside(std::size_t row, const std::string& why);
   void NoteFailure(const Error& error);
@@ -135,7 +138,7 @@ class StoreWriter {
   std::atomic<std::uint64_t> committed_through_{0};
   std::atomic<std::size_t> bytes_waiting_{0};
   std::atomic<bool> failing_{false};
-  std::atomic<std::int64_t> commit_began_ns_{kNoCommit};
+  std::atomic<std::int64_t> call_began_ns_{kNoCall};
 
   mutable std::mutex lock_;
   std::vector<RefusedRow> refused_;  // under the lock

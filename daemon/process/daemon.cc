@@ -49,6 +49,9 @@ namespace {
 /// the limit would leave such a driver behind without need. With twice as much, the end of a daemon
 /// with a dead camera would take longer than the 2 s that docs/cli.md promises.
 constexpr std::chrono::milliseconds kEndWithin{1000};
+/// The same for the store's file, which is written back into one. A disk that is well takes a
+/// second or some; what is not written back stays in the log beside it.
+constexpr std::chrono::milliseconds kStoreEndWithin{10'000};
 /// The same for DDS, which takes 0.1 s. Half would be short on a busy host, twice as much over 2 s.
 constexpr std::chrono::milliseconds kStatusEndWithin{500};
 
@@ -338,7 +341,12 @@ void Daemon::OpenService() {
   const auto interval = WatchdogInterval(environment);
   if (interval && service_.socket.present()) {
     std::vector<Watchdog::Thread> threads = {
-        {"store", &service_.store, [this] { stored_.writer->Wake(); }},
+        // A store that waits for the disk is no thread that hangs: the daemon says so, and goes on.
+        {"store", &service_.store,
+         [this] {
+           stored_.writer->Wake();
+           if (stored_.writer->writer().in_disk()) Answering (&service_.store)();
+         }},
         {"planner", &service_.planner, [this] { planner_->Wake(); }}};
     if (status_.thread != nullptr)
       threads.push_back({"status", &service_.status, [this] { status_.thread->Wake(); }});
@@ -389,17 +397,26 @@ Status Daemon::End() {
                                     {"the reader", [this] { stored_.reader.reset(); }}});
   const Status stored = stored_.writer->Finish();
   doors_.handler->Close();
-  status_.ending =
-      std::make_unique<BoundedEnd>(std::vector<BoundedEnd::Part>{{"the status", [this] {
-                                                                    measuring_.credentials.reset();
-                                                                    status_.thread.reset();
-                                                                    status_.publisher.reset();
-                                                                  }}});
+  // A store's thread that is left behind still uses the status.
+  const bool is_stored = stored_.writer->ended();
+  status_.ending = std::make_unique<BoundedEnd>(
+      is_stored ? std::vector<BoundedEnd::Part>{{"the status",
+                                                 [this] {
+                                                   measuring_.credentials.reset();
+                                                   status_.thread.reset();
+                                                   status_.publisher.reset();
+                                                 }}}
+                : std::vector<BoundedEnd::Part>{});
   std::vector<std::string> left = ending_->Wait(kEndWithin);
-  if (stored_.writer->ended()) store_.reset();
+  if (is_stored)
+    stored_.closing = std::make_unique<BoundedEnd>(
+        std::vector<BoundedEnd::Part>{{"the store", [this] { store_.reset(); }}});
   doors_.handler.reset();
   for (std::string& part : status_.ending->Wait(kStatusEndWithin)) left.push_back(std::move(part));
-  left_ = !left.empty() || !stored_.writer->ended();
+  if (is_stored)
+    for (std::string& part : stored_.closing->Wait(kStoreEndWithin))
+      left.push_back(std::move(part));
+  left_ = !left.empty() || !is_stored;
   if (!left.empty())
     spdlog::warn("{} did not end within {} ms and {} left behind", fmt::join(left, ", "),
                  kEndWithin.count(), left.size() == 1 ? "is" : "are");

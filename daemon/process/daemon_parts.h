@@ -14,6 +14,7 @@
 #include "daemon/loop/watchdog.h"
 #include "daemon/metrics/metrics_endpoint.h"
 #include "daemon/metrics/metrics_sampler.h"
+#include "daemon/process/bounded_end.h"
 #include "daemon/process/dds_setup.h"
 #include "daemon/process/http_door.h"
 #include "daemon/process/sector_setup.h"
@@ -63,6 +64,7 @@ struct StoreThreads {
   std::unique_ptr<journal::JournalThread> journal;  // none: [journal] has a limit of 0
   std::unique_ptr<StoreThread> writer;
   std::unique_ptr<ReaderThread> reader;
+  std::unique_ptr<BoundedEnd> closing;  // at the end
 };
 
 /// Numbers for /metrics. The counters are kept also where there is no endpoint.

@@ -47,6 +47,7 @@ class LineHall final : public LineExchange {
     lines_.pop_front();
     return line;
   }
+  [[nodiscard]] bool connected(ClientId /*client*/) const override { return true; }
   bool Answer(ClientId client, std::string_view line) override {
     return hooks_.out(client, line, true);
   }

@@ -1,5 +1,6 @@
 #include "daemon/verbs/state_requests.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "daemon/control/messages.h"
@@ -7,17 +8,21 @@
 namespace focalfleet {
 
 Status StateRequests::Add(ClientId client, std::uint64_t id) {
-  if (asked_.size() >= kOpenRequestsMax)
-    return Fail(ErrorCode::kFull, std::to_string(asked_.size()) +
-                                      " requests wait for the state; ask again in a second");
+  const auto is_its_own = [&](const Asker& asker) { return asker.client == client; };
+  if (std::ranges::any_of(asked_, is_its_own) || std::ranges::any_of(awaiting_, is_its_own))
+    return Fail(ErrorCode::kFull, "this client waits for the state already");
+  std::erase_if(asked_, [&](const Asker& asker) { return !server_->connected(asker.client); });
   asked_.push_back({client, id});
   return {};
 }
 
 void StateRequests::Serve(const FleetView& view, const std::function<bool(StateRows*)>& submit) {
-  if (text_ && !awaiting_.empty()) {
-    Answer(awaiting_.back());
-    awaiting_.pop_back();
+  if (text_) {
+    std::erase_if(awaiting_, [&](const Asker& asker) { return !server_->connected(asker.client); });
+    if (!awaiting_.empty()) {
+      Answer(awaiting_.front());
+      awaiting_.erase(awaiting_.begin());
+    }
     if (awaiting_.empty()) text_.reset();
   }
   if (!awaiting_.empty() || asked_.empty()) return;

@@ -20,8 +20,8 @@ class StateRequests {
   /// `server` outlives it.
   explicit StateRequests(LineExchange* server) : server_(server) {}
 
-  /// The client waits for the state; `id` is the number of its request. Errors: kFull: too many
-  /// wait.
+  /// The client waits for the state; `id` is the number of its request. Errors: kFull: it does
+  /// already, so that a client that does not read has one answer in memory.
   Status Add(ClientId client, std::uint64_t id);
   /// A turn: one client receives the text, where it is there, and the next rows go to `submit`,
   /// where clients wait for them. Rows for which `submit` returns false are taken anew later.

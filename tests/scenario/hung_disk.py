@@ -11,10 +11,12 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 PATIENCE_S = 60
 END_WITHIN_S = 30  # the daemon waits 10 s for the disk
+WATCHDOG_S = 4  # a service manager kills a daemon that gives no sign of life for so long
 CONFIG = """
 [fleet]
 units = "units.csv"
@@ -63,11 +65,30 @@ def wait_until(what, is_so):
     raise AssertionError(f"not so within {PATIENCE_S} s: {what}")
 
 
+class ServiceManager:
+    """Measures the longest time between two signs of life of the daemon."""
+
+    def __init__(self, path):
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.bind(path)
+        self.last_s = None
+        self.longest_s = 0
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def listen(self):
+        while True:
+            if "WATCHDOG=1" in self.socket.recv(4096).decode():
+                now_s = time.monotonic()
+                if self.last_s is not None:
+                    self.longest_s = max(self.longest_s, now_s - self.last_s)
+                self.last_s = now_s
+
+
 def unit_is_enabled(path):
     return ask(path, "unit", unit_id=1)["enabled"]
 
 
-def run(daemon, path, flag):
+def run(daemon, path, flag, manager):
     wait_until("the fleet is ready", lambda: ask(path, "status")["phases"].get("ready") == 12)
     open(flag, "w").close()
     late = send(path, "disable", unit_ids=[1], reason="a trial")
@@ -89,6 +110,8 @@ def run(daemon, path, flag):
         assert "NOT stored" in str(refused), refused
     wait_until("the store is well again", lambda: not ask(path, "status")["store"]["failing"])
     assert not unit_is_enabled(path)
+    assert manager.last_s is not None and manager.longest_s < WATCHDOG_S, manager.longest_s
+    print(f"signs of life were at most {manager.longest_s:.1f} s apart, {WATCHDOG_S} s are allowed")
     ask(path, "apply", targets_csv=targets, source="trial", wait=True)
     open(flag, "w").close()
     late = send(path, "enable", unit_ids=[1])
@@ -112,11 +135,13 @@ def main():
         subprocess.run([f"{folder_of_programs}/focalfleet", "-q", "layout", "hex", "--count", "12", "--out", f"{folder}/units.csv"], check=True)
         with open(f"{folder}/focalfleet.toml", "w") as config:
             config.write(CONFIG)
+        manager = ServiceManager(f"{folder}/notify")
         with open(log, "w") as errors:
             daemon = subprocess.Popen([f"{folder_of_programs}/focalfleetd", "--config", f"{folder}/focalfleet.toml"],
-                                      env=dict(os.environ, LD_PRELOAD=shim, HUNG_DISK=flag), stderr=errors, stdout=errors)
+                                      env=dict(os.environ, LD_PRELOAD=shim, HUNG_DISK=flag, NOTIFY_SOCKET=f"{folder}/notify",
+                                               WATCHDOG_USEC=str(1_000_000 * WATCHDOG_S)), stderr=errors, stdout=errors)
         try:
-            run(daemon, path, flag)
+            run(daemon, path, flag, manager)
             text = open(log).read()
             assert text.count("the disk does not answer") >= 2, text
         except BaseException:

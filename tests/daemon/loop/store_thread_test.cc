@@ -159,8 +159,10 @@ TEST(StoreThread, ACommitThatDoesNotEndIsAFailureForAsLong) {
   const EventSignal progressed = EventSignal::Create().value();
   const auto thread = StoreThread::Create(Impatient(disk.Sinks()), &progressed).value();
   disk.Hang(true);
+  EXPECT_FALSE(thread->writer().in_disk());
   thread->Commit(1, Named("a"));
   ASSERT_TRUE(Await(progressed, [&] { return thread->failing(); }));
+  EXPECT_TRUE(thread->writer().in_disk());
   EXPECT_THAT(thread->failure().value().text, HasSubstr("does not answer"));
   EXPECT_EQ(thread->committed_through(), 0u);
   disk.Hang(false);

@@ -123,85 +123,14 @@ class BusyRequestHandlerTest : public RequestHandlerTest {
   BusyRequestHandlerTest() : RequestHandlerTest(500) {}
 };
 
-// Answers to `state`, whose text another thread makes.
-class StateRequestTest : public RequestHandlerTest {
- protected:
-  void Ask(RawClient* client) {
-    client->Send(Line(1, "state"));
-    TurnUntilQuiet();
-  }
-  void Serve() {
-    handler_.states().Serve(fleet_.View(), [this](StateRows* rows) {
-      if (has_room_) taken_.push_back(*rows);
-      return has_room_;
-    });
-  }
-  std::size_t Answered() {
-    std::size_t answered = 0;
-    for (auto& client : clients_) answered += client->Receive().empty() ? 0u : 1u;
-    return answered;
-  }
-  bool has_room_ = true;
-  std::vector<StateRows> taken_;
-};
-
-TEST_F(StateRequestTest, AllWhoAskedShareTheRowsAndOneIsAnsweredATurn) {
-  for (int i = 0; i < 40; ++i) Add();
+TEST_F(RequestHandlerTest, WhoWaitsForTheStateIsAnsweredAtTheEnd) {
+  Add(Line(1, "state"));
   TurnUntilQuiet();
-  EXPECT_EQ(handler_.wake_at(), kNever);
-  for (auto& client : clients_) Ask(client.get());
   EXPECT_EQ(handler_.wake_at(), HostInstant{0});
-  Serve();
-  Serve();
-  ASSERT_EQ(taken_.size(), 1u);
-  EXPECT_EQ(taken_[0]->size(), fleet_.layout().size());
-  EXPECT_EQ(Answered(), 0u);
+  handler_.states().Serve(fleet_.View(), [](StateRows*) { return true; });
   EXPECT_EQ(handler_.wake_at(), kNever) << "the other thread wakes the core";
-  handler_.states().Written(StateText(*taken_[0]));
-  for (int turn = 1; turn <= 40; ++turn) {
-    EXPECT_EQ(handler_.wake_at(), HostInstant{0});
-    Serve();
-    ASSERT_EQ(Answered(), 1u) << "in turn " << turn;
-  }
-  EXPECT_EQ(handler_.wake_at(), kNever);
-  EXPECT_EQ(taken_.size(), 1u);
-}
-
-TEST_F(StateRequestTest, RowsAreNeverOlderThanTheQuestion) {
-  Add();
-  Add();
-  TurnUntilQuiet();
-  Ask(clients_[0].get());
-  Serve();
-  Ask(clients_[1].get());
-  handler_.states().Written("\"before\"");
-  Serve();
-  EXPECT_THAT(clients_[0]->Receive(), HasSubstr(R"("result":"before")"));
-  EXPECT_EQ(clients_[1]->Receive(), "");
-  ASSERT_EQ(taken_.size(), 2u);
-  handler_.states().Written("\"after\"");
-  Serve();
-  EXPECT_EQ(clients_[0]->Receive(), "");
-  EXPECT_THAT(clients_[1]->Receive(), HasSubstr(R"("result":"after")"));
-}
-
-TEST_F(StateRequestTest, IsAnsweredWhereThereIsNoRoomNoMemoryOrAnEnd) {
-  for (int i = 0; i < 2; ++i) Add();
-  TurnUntilQuiet();
-  Ask(clients_[0].get());
-  has_room_ = false;
-  Serve();
-  EXPECT_EQ(handler_.wake_at(), HostInstant{0}) << "rows are taken anew";
-  has_room_ = true;
-  Serve();
-  handler_.states().Written("");
-  Serve();
-  EXPECT_THAT(clients_[0]->Receive(), HasSubstr("the state found no memory"));
-  Ask(clients_[0].get());
-  Serve();
-  Ask(clients_[1].get());
   handler_.Close();
-  for (auto& client : clients_) EXPECT_THAT(client->Receive(), HasSubstr("the daemon ends"));
+  EXPECT_THAT(clients_[0]->Receive(), HasSubstr("the daemon ends"));
 }
 
 TEST_F(BusyRequestHandlerTest, CheapLinesShareATurnWithinItsBudget) {

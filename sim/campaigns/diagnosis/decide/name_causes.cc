@@ -110,6 +110,12 @@ void MergeCauses(std::vector<CauseFound>* causes) {
     }
     AddUnits(cause, &*same);
     same->at_bound = same->at_bound || cause.at_bound;
+    same->bound_share = std::max(same->bound_share, cause.bound_share);
+    if (const auto curve = cause.log_odds.find(std::string(kSomethingUnknown));
+        curve != cause.log_odds.end()) {
+      double& odds = same->log_odds.emplace(*curve).first->second;
+      odds = std::max(odds, curve->second);
+    }
     same->size_um = std::hypot(same->size_um, cause.size_um);
     same->delta_log_likelihood += cause.delta_log_likelihood;
     for (std::string& name : cause.cannot_be) same->cannot_be.push_back(std::move(name));

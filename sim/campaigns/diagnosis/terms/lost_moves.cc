@@ -1,5 +1,6 @@
 #include "sim/campaigns/diagnosis/terms/lost_moves.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -56,7 +57,7 @@ std::vector<EventTerm> TakeLostMoves(std::size_t unit, double price, StepRows* r
   std::vector<std::size_t> moves;
   while (moves.size() < kOfUnitMax) {
     const LostMove lost = BestLostMove(*rows, price);
-    if (lost.move == kNone) break;
+    if (lost.move == kNone || std::ranges::count(moves, lost.move) != 0) break;
     Take(lost.move, 1, rows);
     moves.push_back(lost.move);
   }

@@ -164,7 +164,11 @@ class TakenSlips {
       Add(slip);
     }
     constexpr int kSweeps = 3;
-    for (int sweep = 0; sweep < kSweeps && (DropPairs() || Exchange()); ++sweep) {
+    bool changed = true;
+    for (int sweep = 0; changed && sweep < kSweeps; ++sweep) {
+      while (DropPair()) {
+      }
+      changed = Exchange();
     }
   }
   [[nodiscard]] const std::vector<Slip>& slips() const { return slips_; }
@@ -192,6 +196,10 @@ class TakenSlips {
   }
   // The best slip by all rows of its history.
   [[nodiscard]] Slip BestByAll() {
+    // Columns take 32 bytes for each two rows: 32 MB. With half of it units of 750 rows, and with
+    // double those of 1500, do without exchanges; steps are then as few rows showed them.
+    constexpr std::size_t kRowsMost = 1000;
+    if (rows_.rows() > kRowsMost) return {};
     if (before_row_.empty()) LookBeforeRows();
     Slip best;
     for (const BeforeRow& one : before_row_)
@@ -205,7 +213,7 @@ class TakenSlips {
       for (const std::size_t axis : {kTheta, kPhi}) {
         Eigen::VectorXd column = rows_.Column(axis, rows_.move(k), true);
         const double square = column.squaredNorm();
-        before_row_.push_back({axis, std::move(column), square, k == 0 ? 0 : rows_.MoveAfterRow(k),
+        before_row_.push_back({axis, std::move(column), square, rows_.MoveAfterRow(k),
                                rows_.move(rows_.RowThatShows(axis, k))});
       }
   }
@@ -230,15 +238,17 @@ class TakenSlips {
     }
     return changed;
   }
-  // Drops two slips of one move that do not pay together. True: any were dropped.
-  bool DropPairs() {
+  // Drops two slips of one move that do not pay together. False: there are none.
+  bool DropPair() {
     for (std::size_t a = 0; a < slips_.size(); ++a)
       for (std::size_t b = a + 1; b < slips_.size(); ++b) {
         if (slips_[a].move != slips_[b].move) continue;
+        const std::vector<Slip> as_is = slips_;
         const double before = Cost();
         const Slip later = Remove(b), earlier = Remove(a);
         if (Cost() < before - kRounding) return true;
         Add(earlier), Add(later);
+        slips_ = as_is;
       }
     return false;
   }

@@ -72,11 +72,14 @@ StepRows::Jump StepRows::JumpAt(std::size_t row, std::size_t either_side, double
 }
 
 std::size_t StepRows::MoveAfterRow(std::size_t row) const {
-  std::size_t begin = move(row - 1) + 1;
-  for (std::size_t end = EndOfHistory(track(), move(row - 1)); end <= move(row);
-       end = EndOfHistory(track(), end))
-    begin = end;
-  return begin;
+  const std::vector<char>& closed = track().facts->closed;
+  const auto undoes_steps = [&](std::size_t one) {
+    return track().restarts[one] != 0 || (!closed.empty() && closed[track().first_row + one] != 0);
+  };
+  const std::size_t earliest = row == 0 ? 0 : move(row - 1) + 1;
+  std::size_t first = move(row);
+  while (first > earliest && !undoes_steps(first)) --first;
+  return first;
 }
 
 std::size_t StepRows::RowThatShows(std::size_t axis, std::size_t row) const {

@@ -37,8 +37,8 @@ class StepRows {
   /// log likelihood ratio above `least`.
   [[nodiscard]] Jump JumpAt(std::size_t row, std::size_t either_side, double least) const;
 
-  /// The first move in which a step before this row may have been: after the row before, and not
-  /// before the last homing. Pre: row > 0.
+  /// The first move in which a step that this row shows may have been: after the row before, and
+  /// not before a homing or the closing of a loop that has undone it.
   [[nodiscard]] std::size_t MoveAfterRow(std::size_t row) const;
   /// The first row from this one on that would show a turn of the axis, above its noise, within the
   /// same history. Folded arms do not show where theta stands.
