@@ -5,6 +5,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstring>
 
@@ -36,8 +38,14 @@ std::optional<std::string> DatagramInbox::Next(int limit_ms) const {
 }
 
 std::optional<std::string> DatagramInbox::NextWith(const std::string& text, int limit_ms) const {
-  for (auto next = Next(limit_ms); next; next = Next(limit_ms))
+  using std::chrono::duration_cast, std::chrono::milliseconds, std::chrono::steady_clock;
+  const auto until = steady_clock::now() + milliseconds(limit_ms);
+  int left_ms = limit_ms;
+  for (auto next = Next(left_ms); next; next = Next(left_ms)) {
     if (next->find(text) != std::string::npos) return next;
+    const auto left = duration_cast<milliseconds>(until - steady_clock::now());
+    left_ms = std::max(0, static_cast<int>(left.count()));
+  }
   return std::nullopt;
 }
 

@@ -16,8 +16,9 @@ class DatagramInbox {
 
   /// The next datagram; none where none comes within `limit_ms`.
   std::optional<std::string> Next(int limit_ms = 30'000) const;
-  /// Takes datagrams until one contains `text`, and returns it; none where none comes in time.
-  std::optional<std::string> NextWith(const std::string& text, int limit_ms = 30'000) const;
+  /// Takes datagrams until one contains `text`, and returns it; none where none of those that come
+  /// within `limit_ms` does.
+  std::optional<std::string> NextWith(const std::string& text, int limit_ms = 60'000) const;
 
  private:
   int fd_ = -1;
