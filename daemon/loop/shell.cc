@@ -103,9 +103,7 @@ void Shell::Step() {
   // This order matters: a batch that is committed in between is reported one step later.
   // The store's thread may change its failure at any time, so it is read once.
   const std::optional<Error> failure = parts_.store->failure();
-  if (store_.failing != failure.has_value()) {
-    parts_.alarms->NoteStore(parts_.clock.Wall(), failure);
-  }
+  if (store_.failing != failure.has_value()) parts_.alarms->NoteStore(parts_.clock.Wall(), failure);
   // Other failures are logged by the writer, whose thread now waits for the disk.
   if (const bool hangs = parts_.store->hangs(); std::exchange(store_.hangs, hangs) != hangs)
     spdlog::log(hangs ? spdlog::level::err : spdlog::level::info, "the disk {}",

@@ -31,11 +31,9 @@ StoreThread::~StoreThread() {
 }
 
 Status StoreThread::Finish() {
-  constexpr std::chrono::milliseconds kLook{1};
+  constexpr std::chrono::milliseconds kLook{1};  // between looks: a commit takes longer
   while (!ended_) {
-    if (writer_.hangs())
-      return tl::unexpected<Error>(writer_.failure().value_or(
-          Error{ErrorCode::kUnavailable, "the disk did not answer for too long"}));
+    if (writer_.hangs()) return Fail(ErrorCode::kUnavailable, StoreWriter::kNoAnswer);
     if (writer_.held() > 0 && !writer_.failing()) {
       writer_.HandOver();
     } else if (!ending_.exchange(true)) {  // not before: a thread that has nothing left ends

@@ -74,7 +74,7 @@ std::vector<RefusedRow> StoreWriter::TakeRefused() {
 }
 
 std::optional<Error> StoreWriter::failure() const {
-  if (hangs()) return Error{ErrorCode::kUnavailable, "the disk does not answer"};
+  if (hangs()) return Error{ErrorCode::kUnavailable, kNoAnswer};
   const std::lock_guard lock(lock_);
   return failing_ ? std::optional(last_error_) : std::nullopt;
 }

@@ -65,6 +65,9 @@ class StoreWriter {
     std::function<void()> offered = [] {};     // a batch or a status waits for a turn
   };
 
+  /// The reason of a failure that lasts as long as a call of the disk hangs.
+  static constexpr const char* kNoAnswer = "the disk does not answer";
+
   explicit StoreWriter(Sinks sinks);
   StoreWriter(const StoreWriter&) = delete;
   StoreWriter& operator=(const StoreWriter&) = delete;

@@ -49,8 +49,9 @@ namespace {
 /// the limit would leave such a driver behind without need. With twice as much, the end of a daemon
 /// with a dead camera would take longer than the 2 s that docs/cli.md promises.
 constexpr std::chrono::milliseconds kEndWithin{1000};
-/// The same for the store's file, which is written back into one. A disk that is well takes a
-/// second or some; what is not written back stays in the log beside it.
+/// The same for the store's file, into which its log is written back: some 9 MB of 5000 units. With
+/// half of it a slow disk would leave the log beside the file, which loses nothing. With twice as
+/// much a disk that hangs would hold the end up for longer.
 constexpr std::chrono::milliseconds kStoreEndWithin{10'000};
 /// The same for DDS, which takes 0.1 s. Half would be short on a busy host, twice as much over 2 s.
 constexpr std::chrono::milliseconds kStatusEndWithin{500};
@@ -343,9 +344,9 @@ void Daemon::OpenService() {
     std::vector<Watchdog::Thread> threads = {
         // A store that waits for the disk is no thread that hangs: the daemon says so, and goes on.
         {"store", &service_.store,
-         [this] {
+         [this, answer = Answering(&service_.store)] {
            stored_.writer->Wake();
-           if (stored_.writer->writer().in_disk()) Answering (&service_.store)();
+           if (stored_.writer->writer().in_disk()) answer();
          }},
         {"planner", &service_.planner, [this] { planner_->Wake(); }}};
     if (status_.thread != nullptr)
@@ -418,8 +419,8 @@ Status Daemon::End() {
       left.push_back(std::move(part));
   left_ = !left.empty() || !is_stored;
   if (!left.empty())
-    spdlog::warn("{} did not end within {} ms and {} left behind", fmt::join(left, ", "),
-                 kEndWithin.count(), left.size() == 1 ? "is" : "are");
+    spdlog::warn("{} did not end in time and {} left behind", fmt::join(left, ", "),
+                 left.size() == 1 ? "is" : "are");
   if (stored)
     spdlog::info("ended, all is stored");
   else

@@ -6,56 +6,20 @@ and after them. The exit code is 1 where a stop was not answered, or where the s
 times that beside nobody, twice in a row. Times themselves depend on the machine and decide nothing."""
 
 import argparse
-import json
 import select
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import time
 
-PATIENCE_S = 120
+from simulated_daemon import Refused, ask, connect, make_folder, send, wait_until_ready
+
 # A stop waits for one line of others at most. With 1000 units, 100 stops and a machine that is busy with builds the ratio was at most 4.
 # Where stops wait in their turn behind the lines of 40 clients, it was 28 to 59 there.
 RATIO_MAX = 12
-CONFIG = """
-[fleet]
-units = "units.csv"
-[dds]
-enabled = false
-[bus]
-port = "simulated"
-[log]
-level = "error"
-"""
 GROUPS = (("nobody", 0, ""), ("10 ask status", 10, "status"), ("10 ask state", 10, "state"), ("40 ask state", 40, "state"),
           ("64 idle", 64, ""))
-
-
-def connect(path):
-    end = socket.socket(socket.AF_UNIX)
-    end.connect(path)
-    end.settimeout(PATIENCE_S)  # from here on: with one, a full backlog would be an error
-    return end
-
-
-def send(end, verb):
-    end.sendall(json.dumps({"id": 1, "verb": verb}).encode() + b"\n")
-
-
-def ask(end, verb):
-    send(end, verb)
-    answer = b""
-    while not answer.endswith(b"\n"):
-        piece = end.recv(1 << 20)
-        if not piece:
-            raise RuntimeError("hung up")
-        answer += piece
-    answer = json.loads(answer)
-    if not answer["ok"]:
-        raise RuntimeError(answer["error"]["text"])
-    return answer["result"]
 
 
 def be_clients(path, count, verb):
@@ -100,7 +64,7 @@ def try_clients(path, name, count, verb, stops):
         p99 = ms[(len(ms) - 1) * 99 // 100]
         print(f"{name:16} {ms[len(ms) // 2]:8.2f} {p99:8.2f} {ms[-1]:8.2f}", flush=True)
         return p99
-    except (RuntimeError, OSError) as error:
+    except (Refused, RuntimeError, OSError) as error:
         print(f"{name:16} NOT ANSWERED: {error}", flush=True)
         return None
     finally:
@@ -127,20 +91,6 @@ def try_all(path, stops):
     return well
 
 
-def wait_until_ready(path, daemon):
-    until = time.monotonic() + PATIENCE_S
-    while time.monotonic() < until and daemon.poll() is None:
-        try:
-            with connect(path) as end:
-                status = ask(end, "status")
-            if status["phases"].get("ready") == status["units"]:
-                return
-        except OSError:
-            pass
-        time.sleep(0.1)
-    raise RuntimeError("the fleet does not become ready")
-
-
 def main():
     if sys.argv[1:2] == ["--clients"]:
         be_clients(sys.argv[2], int(sys.argv[3]), sys.argv[4])
@@ -150,15 +100,12 @@ def main():
     parser.add_argument("--stops", type=int, default=200)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([f"{options.bin}/focalfleet", "-q", "layout", "hex", "--count", str(options.units), "--out", f"{folder}/units.csv"],
-                       check=True)
-        with open(f"{folder}/focalfleet.toml", "w") as config:
-            config.write(CONFIG)
-        daemon = subprocess.Popen([f"{options.bin}/focalfleetd", "--config", f"{folder}/focalfleet.toml"])
+        command, path = make_folder(options.bin, folder, options.units, "error")
+        daemon = subprocess.Popen(command)
         try:
-            wait_until_ready(f"{folder}/control.sock", daemon)
+            wait_until_ready(path, daemon)
             print(f"{'beside':16} {'p50_ms':>8} {'p99_ms':>8} {'most_ms':>8}")
-            well = try_all(f"{folder}/control.sock", options.stops)
+            well = try_all(path, options.stops)
         finally:
             daemon.send_signal(signal.SIGTERM)
             daemon.wait()

@@ -88,7 +88,7 @@ std::size_t TakeSteps(std::vector<UnitSteps>* of_unit, std::vector<EventTerm>* e
     }
     steps = {};
   }
-  constexpr double kRounding_deg = 1e-9;
+  constexpr double kRounding_deg = 1e-9;  // of two steps that undo each other
   std::erase_if(*events,
                 [](const EventTerm& one) { return std::abs(one.step_deg) < kRounding_deg; });
   return changes;

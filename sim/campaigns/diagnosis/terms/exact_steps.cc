@@ -9,11 +9,11 @@
 #include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/plain_geometry.h"
+#include "sim/campaigns/diagnosis/terms/step_rows.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kEventsMax = 40;  // steps of a unit at once
 // A smaller lost command cannot be distinguished from other steps.
 constexpr double kStepMin_deg = 0.3;
 constexpr double kRowsWorth = 3;  // far rows that a change has to put right
@@ -332,7 +332,8 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
     // A change whose size physics gives precedes one of any size, unless it leaves far more.
     const double far_better = kind == ChangeKind::kBlocked ? 0.5 : 1;
     const bool is_whole = kind == ChangeKind::kWholeMove || kind == ChangeKind::kInOrder;
-    const std::size_t at_most = is_whole ? kEventsMax : std::min(far / kRowsForASlip, kEventsMax);
+    const std::size_t at_most =
+        is_whole ? kStepsOfUnitMax : std::min(far / kRowsForASlip, kStepsOfUnitMax);
     for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
       Explained one = ExplainedBy(kind, at_most, fit, unit, from, far_mm);
       if (one.changes.empty() || one.cost >= before || !explains(one, kind)) continue;

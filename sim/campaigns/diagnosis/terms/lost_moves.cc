@@ -1,22 +1,18 @@
 #include "sim/campaigns/diagnosis/terms/lost_moves.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 #include <set>
 #include <utility>
 
-#include "sim/campaigns/diagnosis/terms/slips.h"
 #include "sim/campaigns/diagnosis/terms/step_rows.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-
 struct LostMove {
-  std::size_t move = kNone;
+  std::size_t move = kNoMove;
   double above = 0;  // the price, in ln of the likelihood ratio
 };
 
@@ -37,46 +33,25 @@ LostMove BestLostMove(const StepRows& rows, double price) {
         if (log_ratio - price > best.above) best = {move, log_ratio - price};
       }
     }
-    if (best.move != kNone) break;
+    if (best.move != kNoMove) break;
   }
   return best;
 }
 
-// Takes the move as lost (1), or takes that back (-1).
-void Take(std::size_t move, double sign, StepRows* rows) {
-  for (const std::size_t axis : {kTheta, kPhi}) {
-    const double by_deg = -rows->track().step_deg[axis][move];
-    if (by_deg != 0) rows->Take(rows->Column(axis, move, true), sign * by_deg);
-  }
-}
-
-// Takes lost moves, one after the other, and drops those that do not pay by all rows up to the next
-// homing, beside the others.
+// Takes lost moves, one after the other.
 std::vector<EventTerm> TakeLostMoves(std::size_t unit, double price, StepRows* rows) {
-  constexpr std::size_t kOfUnitMax = 40;
-  std::vector<std::size_t> moves;
-  while (moves.size() < kOfUnitMax) {
-    const LostMove lost = BestLostMove(*rows, price);
-    if (lost.move == kNone || std::ranges::count(moves, lost.move) != 0) break;
-    Take(lost.move, 1, rows);
-    moves.push_back(lost.move);
-  }
-  for (std::size_t k = 0; k < moves.size();) {
-    const double with = rows->left().squaredNorm() / 2;
-    Take(moves[k], -1, rows);
-    if (rows->left().squaredNorm() / 2 < with + price) {
-      moves.erase(moves.begin() + static_cast<std::ptrdiff_t>(k));
-      k = 0;
-      continue;
-    }
-    Take(moves[k], 1, rows);
-    ++k;
-  }
   std::vector<EventTerm> events;
-  for (const std::size_t move : moves)
-    for (const std::size_t axis : {kTheta, kPhi})
-      if (const double by_deg = -rows->track().step_deg[axis][move]; by_deg != 0)
-        events.push_back({unit, rows->track().first_row + move, axis, true, by_deg});
+  std::set<std::size_t> moves;
+  while (moves.size() < kStepsOfUnitMax) {
+    const LostMove lost = BestLostMove(*rows, price);
+    if (lost.move == kNoMove || !moves.insert(lost.move).second) break;
+    for (const std::size_t axis : {kTheta, kPhi}) {
+      const double by_deg = -rows->track().step_deg[axis][lost.move];
+      if (by_deg == 0) continue;
+      rows->Take(rows->Column(axis, lost.move, true), by_deg);
+      events.push_back({unit, rows->track().first_row + lost.move, axis, true, by_deg});
+    }
+  }
   return events;
 }
 
@@ -122,8 +97,7 @@ std::optional<std::vector<EventTerm>> LostMovesAnew(const Fit& fit, std::size_t 
   std::set<std::size_t> moves;
   for (const EventTerm& event : lost) moves.insert(event.row);
   const double anew = rows.left().squaredNorm() / 2 + price * static_cast<double>(moves.size());
-  constexpr double kRounding = 1e-6;
-  if (anew >= as_is - kRounding) return std::nullopt;
+  if (anew >= as_is - kCostRounding) return std::nullopt;
   return lost;
 }
 

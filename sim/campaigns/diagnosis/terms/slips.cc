@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <span>
 #include <utility>
@@ -13,13 +12,10 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kSlipsOfUnitMax = 40;
 // Share of a turn by which a step may lie beside a whole number of turns, either way. Chance passes
 // half of all steps. With 0.125 one of nine slips of a unit is taken for one of the other axis;
 // with 0.5 every step passes, and steps that are none are taken again and again.
 constexpr double kBeside = 0.25;
-
-constexpr std::size_t kNoMove = std::numeric_limits<std::size_t>::max();
 
 // The longest move from one to another that went against a slip by so many turns.
 std::size_t MoveAgainst(const UnitTrack& track, std::size_t axis, std::size_t from, std::size_t to,
@@ -44,14 +40,14 @@ struct SlipRule {
   const SlipPrices& prices;
   double scale = 1;  // of the prices
 
-  // Takes a step of the axis by b / g, in the moves from one to another, if it is a better slip.
   struct AxisScore {
     double b = 0, g = 0;
   };
+  // Takes a step of the axis by b / g, in the moves from one to another, if it is a better slip.
   void Try(const StepRows& rows, std::size_t axis, AxisScore score, std::size_t from,
            std::size_t to, Slip* best) const {
     const auto [b, g] = score;
-    if (!(g > 0)) return;
+    if (!(g > 0)) return;  // these rows show no step of the axis
     const double turn = 360 / rows.track().unit->gear[axis];
     const double turns = std::round(b / g / turn), step_deg = turns * turn;
     // A step that lies between two numbers of turns is none of a rotor.
@@ -82,10 +78,6 @@ Slip BestSlip(const StepRows& rows, const SlipRule& rule) {
   }
   return best;
 }
-
-}  // namespace
-
-namespace {
 
 // Whole turns of the slip, 1 to kSlipTurnsMax.
 std::size_t TurnsOf(const Fit& fit, const EventTerm& slip) {
@@ -158,7 +150,7 @@ class TakenSlips {
   /// Takes slips, one after the other, and looks at each once more beside all others: one that few
   /// rows showed may be another one by all.
   void Find() {
-    while (slips_.size() < kSlipsOfUnitMax) {
+    while (slips_.size() < kStepsOfUnitMax) {
       const Slip slip = BestSlip(rows_, rule_);
       if (slip.move == kNoMove) break;
       Add(slip);
@@ -226,12 +218,12 @@ class TakenSlips {
       const double without = Cost();
       const Slip best = BestByAll();
       if (best.move != kNoMove) Add(best);
-      if (Cost() < std::min(before, without) - kRounding) {
+      if (Cost() < std::min(before, without) - kCostRounding) {
         changed = true;
         continue;
       }
       if (best.move != kNoMove) Remove(slips_.size() - 1);
-      if (without < before - kRounding)
+      if (without < before - kCostRounding)
         changed = true;
       else
         Add(own);
@@ -246,7 +238,7 @@ class TakenSlips {
         const std::vector<Slip> as_is = slips_;
         const double before = Cost();
         const Slip later = Remove(b), earlier = Remove(a);
-        if (Cost() < before - kRounding) return true;
+        if (Cost() < before - kCostRounding) return true;
         Add(earlier), Add(later);
         slips_ = as_is;
       }
@@ -261,7 +253,6 @@ class TakenSlips {
     std::size_t from = 0, to = 0;
   };
 
-  static constexpr double kRounding = 1e-6;
   StepRows& rows_;
   SlipRule rule_;
   std::vector<Slip> slips_;
@@ -308,8 +299,7 @@ std::optional<std::vector<EventTerm>> SlipsAnew(const Fit& fit, std::size_t unit
   as_is += static_cast<double>(other_moves.size()) * price_of_other;
   TakenSlips taken(&rows, {prices, 1});
   taken.Find();
-  constexpr double kRounding = 1e-6;
-  if (taken.Cost() >= as_is - kRounding) return std::nullopt;
+  if (taken.Cost() >= as_is - kCostRounding) return std::nullopt;
   return EventsOf(taken.slips(), unit, rows);
 }
 

@@ -17,11 +17,6 @@
 
 namespace focalfleet::sim {
 
-/// The probability from which a step is taken, where others like it are known: as that of a name.
-/// Half and double of its odds change no name of three campaigns of another author, and two of 80
-/// steps.
-inline constexpr double kSureOfStep = 0.9;
-
 /// Turns that a rotor may lose at once, at most.
 inline constexpr int kSlipTurnsMax = 20;
 

@@ -6,6 +6,8 @@
 
 #include <Eigen/Dense>
 #include <array>
+#include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "sim/campaigns/diagnosis/model/fit.h"
@@ -57,6 +59,21 @@ class StepRows {
   Eigen::VectorXd y_;
   std::vector<StepProducts> sums_;  // of all rows before each. Shape: (rows + 1)
 };
+
+/// The probability from which a step is taken, where others like it are known: as that of a name.
+/// Half and double of its odds change no name of three campaigns of another author, and two of 80
+/// steps.
+inline constexpr double kSureOfStep = 0.9;
+
+/// Steps of a unit that are looked for in one look.
+inline constexpr std::size_t kStepsOfUnitMax = 40;
+
+/// Costs of explanations, in ln of a likelihood, differ by more than rounding. Sums of some
+/// thousands of squares are exact to a thousandth of it.
+inline constexpr double kCostRounding = 1e-6;
+
+/// No move of a track.
+inline constexpr std::size_t kNoMove = std::numeric_limits<std::size_t>::max();
 
 /// Rows on either side that a step is looked for by. The narrowest that shows one has the fewest
 /// other steps within it: narrowest over threshold, Baranowski et al., J. R. Stat. Soc. B 81, 649.
