@@ -48,8 +48,8 @@ class ServiceManagerTest : public FocalfleetdTest {
     return 0;
   }
 
-  /// Stops the thread until the manager hears of the trouble. One that was stopped within a commit
-  /// counts as waiting for the disk, so that it is let go and stopped anew.
+  /// Stops the thread until the manager hears of the trouble. A thread that was stopped within a
+  /// commit counts as waiting for the disk, so that it is let go and stopped anew.
   [[nodiscard]] bool Hang(pid_t thread, const std::string& trouble) const {
     constexpr int kTries = 3;
     for (int i = 0; i < kTries; ++i) {
