@@ -373,6 +373,7 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
   CampaignFacts facts;
   facts.campaign = &campaign;
   facts.exposures = FindExposures(campaign);
+  facts.frames = FindFrames(campaign);
   for (const Covariate& covariate : campaign.covariates) {
     FilledColumn column = Fill(covariate.values, campaign, facts.exposures);
     if (column.missing_share <= kMissingShareMax) facts.columns[covariate.name] = std::move(column);

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "sim/campaigns/campaign/campaign.h"
+#include "sim/campaigns/campaign/frames.h"
 
 namespace focalfleet::sim {
 
@@ -55,6 +56,7 @@ inline constexpr double kDriveLeast = 0.05;
 struct CampaignFacts {
   const Campaign* campaign = nullptr;
   Exposures exposures;
+  Frames frames;
   std::map<std::string, FilledColumn, std::less<>> columns;
   std::vector<char> restarts;  // Shape: (rows): the unit's history begins anew here
   // Shape: (rows), or empty where no row is: the loop was closed before the move (closed_loop.h).

@@ -20,6 +20,7 @@
 #include "sim/campaigns/diagnosis/design/next_moves.h"
 #include "sim/campaigns/diagnosis/model/chances.h"
 #include "sim/campaigns/diagnosis/model/discrepancy.h"
+#include "sim/campaigns/diagnosis/model/one_frame.h"
 #include "sim/campaigns/diagnosis/model/plain_geometry.h"
 #include "sim/campaigns/diagnosis/search/beaten.h"
 #include "sim/campaigns/diagnosis/search/find_model.h"
@@ -271,7 +272,6 @@ void DescribeRows(const RepeatedPlaces& repeated, const CampaignFacts& facts,
   diagnosis->moves = facts.exposures.size();
   Remark(RemarksOnRepeats(repeated, facts.campaign->rows()), diagnosis);
   Remark(RemarksOnOrder(facts), diagnosis);
-  diagnosis->steps = FindPlaceSteps(*facts.campaign);
 }
 
 // The steps of the places limit the diagnosis where they make more of the noise than all else does.
@@ -336,6 +336,9 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   options.progress(0, "reading the moves");
   const RepeatedPlaces repeated = ForgetRepeatedPlaces(&campaign);
   campaign.units = FindCoordinatorsGeometry(campaign);
+  diagnosis.steps = FindPlaceSteps(campaign);
+  const Places as_measured{campaign.x_mm, campaign.y_mm};
+  BringIntoOneFrame(options.parallel, &campaign);
   CampaignFacts facts = MakeFacts(campaign);
   DescribeRows(repeated, facts, &diagnosis);
   std::vector<char> aside;
@@ -393,6 +396,10 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   ProposeNextMoves(fit, as_named, options, &diagnosis);
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
   diagnosis.model = fit.model;
+  diagnosis.model.frames.clear();  // the campaign's own
+  Remark(
+      RemarksOnFrames(facts.frames, Predict(diagnosis.model, facts, options.parallel), as_measured),
+      &diagnosis);
   diagnosis.model.terms.insert(diagnosis.model.terms.begin(), before.terms.begin(),
                                before.terms.end());
   LeaveOutImpossible(given, &diagnosis);

@@ -64,6 +64,29 @@ std::vector<std::string> RemarksOnRepeats(const RepeatedPlaces& repeated, std::s
   return remarks;
 }
 
+std::vector<std::string> RemarksOnFrames(const Frames& frames, const Places& expected,
+                                         const Places& measured) {
+  constexpr std::size_t kShown = 5;
+  const std::vector<Similarity> found = FitFrames(frames, expected, measured);
+  const auto name = [&](std::size_t k) {
+    return std::isnan(frames.id[k]) ? std::string("none") : FourDigits(frames.id[k]);
+  };
+  std::vector<std::string> remarks;
+  for (std::size_t k = 1; k < found.size() && k <= kShown; ++k) {
+    const std::complex<double> factor = found[k].factor / found[0].factor;
+    const double shift_um = kUmPerMm * std::abs(found[k].Of(found[0].Undone(0)));
+    remarks.push_back("in frame " + name(k) + " the camera stands otherwise than in frame " +
+                      name(0) + ": shifted by " + FourDigits(shift_um) +
+                      " um at the centre, turned by " +
+                      FourDigits(std::arg(factor) / kRadiansPerDegree) + " deg, scaled by " +
+                      FourDigits(1e6 * (std::abs(factor) - 1)) + " ppm");
+  }
+  if (found.size() > kShown + 1)
+    remarks.push_back("the places of " + std::to_string(found.size() - kShown - 1) +
+                      " more frames are taken to one frame as well");
+  return remarks;
+}
+
 std::string RemarkOnSteps(const PlaceSteps& steps) {
   const bool alike = std::abs(steps.x_mm - steps.y_mm) < 1e-3 * steps.wider_mm();
   return "places come in steps of " +

@@ -17,6 +17,11 @@ std::vector<std::string> RemarksOnOrder(const CampaignFacts& facts);
 
 std::vector<std::string> RemarksOnRepeats(const RepeatedPlaces& repeated, std::size_t rows);
 
+/// How the camera stood in the first few frames, against the frame with most rows. `expected`: the
+/// places by the model, all in one frame.
+std::vector<std::string> RemarksOnFrames(const Frames& frames, const Places& expected,
+                                         const Places& measured);
+
 std::string RemarkOnSteps(const PlaceSteps& steps);
 
 /// The shortest decimal of four digits.

@@ -85,6 +85,8 @@ Fit StartFit(const CampaignFacts& facts, CampaignModel model, std::vector<char> 
   fit.parallel = std::move(parallel);
   fit.noise.least_um = LeastNoise_um(*facts.campaign, FindPlaceSteps(*facts.campaign));
   fit.noise.unit_factor.assign(fit.model.units.size(), 1);
+  if (const std::size_t frames = facts.frames.size(); frames > 1 && frames <= kFramesOfFitMax)
+    fit.model.frames.assign(frames, FrameTerm{});
   if (!facts.closed.empty()) {
     StartNearTable(GeometryIs::kKnown, &fit);
     return fit;

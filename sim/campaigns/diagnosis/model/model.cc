@@ -23,6 +23,13 @@ void AddEvents(const CampaignModel& model, std::size_t unit, const UnitTrack& tr
   }
 }
 
+void AddImage(const ExposureTerm& image, const PlacePoint& at, double* x_mm, double* y_mm) {
+  *x_mm +=
+      image.shift_x_um * 1e-3 + image.scale_ppm * 1e-6 * at.x_mm - image.turn_urad * 1e-6 * at.y_mm;
+  *y_mm +=
+      image.shift_y_um * 1e-3 + image.scale_ppm * 1e-6 * at.y_mm + image.turn_urad * 1e-6 * at.x_mm;
+}
+
 // The reason why these moves cannot test the term; empty where they can.
 std::string WhyNotTestable(const Template& form, const CampaignFacts& facts) {
   const bool empirical = FindEmpirical(form.effect->cause) != nullptr;
@@ -174,6 +181,21 @@ void ApplyHoming(const UnitTrack& track, const Homing& homing, PoseErrors* error
   for (std::size_t i = homing.begin; i < homing.end; ++i) errors->angle_deg[homing.axis][i] = 1;
 }
 
+bool ApplyFrame(const UnitTrack& track, std::size_t frame, std::size_t parameter,
+                PoseErrors* errors) {
+  errors->Reset(track.moves);
+  FrameTerm one{};
+  one[parameter] = 1;
+  const ExposureTerm image{one[0], one[1], one[2], one[3]};
+  bool has_rows = false;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    if (track.facts->frames.of_row[track.RowOf(i)] != frame) continue;
+    has_rows = true;
+    AddImage(image, {track.fibre_x_mm[i], track.fibre_y_mm[i]}, &errors->x_mm[i], &errors->y_mm[i]);
+  }
+  return has_rows;
+}
+
 void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
                    PoseErrors* errors) {
   for (const ModelTerm& term : model.terms) {
@@ -229,13 +251,12 @@ Places Predict(const CampaignModel& model, const CampaignFacts& facts,
         const std::size_t row = track.first_row + i;
         places.x_mm[row] = place.x_mm + errors.x_mm[i];
         places.y_mm[row] = place.y_mm + errors.y_mm[i];
-        if (model.exposures.empty()) continue;
-        const ExposureTerm& image = model.exposures[facts.exposures.of_row[row]];
-        const double x = place.x_mm, y = place.y_mm;
-        places.x_mm[row] +=
-            image.shift_x_um * 1e-3 + image.scale_ppm * 1e-6 * x - image.turn_urad * 1e-6 * y;
-        places.y_mm[row] +=
-            image.shift_y_um * 1e-3 + image.scale_ppm * 1e-6 * y + image.turn_urad * 1e-6 * x;
+        double *x_mm = &places.x_mm[row], *y_mm = &places.y_mm[row];
+        if (!model.exposures.empty())
+          AddImage(model.exposures[facts.exposures.of_row[row]], place, x_mm, y_mm);
+        if (model.frames.empty()) continue;
+        const FrameTerm& frame = model.frames[facts.frames.of_row[row]];
+        AddImage({frame[0], frame[1], frame[2], frame[3]}, place, x_mm, y_mm);
       }
     }
   });

@@ -3,6 +3,7 @@
 // place of every fibre after every move.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -94,6 +95,16 @@ struct ExposureTerm {
 /// The number of its members.
 inline constexpr int kExposureParameters = 4;
 
+/// The same of all exposures of one frame of the camera, against the first frame, as unknowns of
+/// the fit in the order of ExposureTerm's members.
+using FrameTerm = std::array<double, kExposureParameters>;
+/// A frame may stand anywhere on a bench: the spread of its prior, half and twice of which say the
+/// same as far as there are data. In um, um, urad and ppm.
+inline constexpr FrameTerm kFrameSpread = {1e4, 1e4, 1e5, 1e5};
+/// More frames than these are aligned before a fit alone. A search costs as much for a frame as for
+/// four terms.
+inline constexpr std::size_t kFramesOfFitMax = 25;
+
 /// A step of one axis at one move that stays until the unit is homed (or for that move alone).
 struct EventTerm {
   std::size_t unit = 0;
@@ -112,6 +123,8 @@ struct CampaignModel {
   // A fit's own: what the shapes of terms differ by. A model that is reported has none.
   std::vector<Discrepancy> discrepancies;
   std::vector<ExposureTerm> exposures;  // empty, or Shape: (exposures)
+  // A fit's own, of one campaign's frames; that of the first is 0. Empty, or Shape: (frames).
+  std::vector<FrameTerm> frames;
   std::vector<EventTerm> events;
   // Zeros that differ from homing to homing: the angle that is added, per row. Empty: none.
   std::vector<double> homing_zero_deg[2];
@@ -132,6 +145,11 @@ std::vector<Homing> FreeHomingsOf(const CampaignModel& model, const UnitTrack& t
 /// Sets `errors` to one degree on the axis while the homing lasts.
 void ApplyHoming(const UnitTrack& track, const Homing& homing, PoseErrors* errors);
 
+/// Sets `errors` to those of one parameter of a frame at 1. Returns whether the unit has rows in
+/// it.
+bool ApplyFrame(const UnitTrack& track, std::size_t frame, std::size_t parameter,
+                PoseErrors* errors);
+
 /// Adds the pose errors of one unit by all terms, events and homings of the model.
 void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
                    PoseErrors* errors);
@@ -145,11 +163,6 @@ struct NotTestable {
 /// Takes out the terms that cannot predict this campaign: it lacks a column, or its units and moves
 /// have no such part. Returns them with the reasons.
 std::vector<NotTestable> LeaveOutUntestable(const CampaignFacts& facts, CampaignModel* model);
-
-struct Places {
-  std::vector<double> x_mm;  // Shape: (rows)
-  std::vector<double> y_mm;
-};
 
 /// A unit's moves at the poses after its steps, and after all errors where these are large. A lost
 /// command may be half a turn, and a place depends differently on the geometry there.

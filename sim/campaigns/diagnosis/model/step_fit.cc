@@ -44,6 +44,19 @@ Index CountShared(const ModelTerm& term) {
   return static_cast<Index>(term.amplitude.size());
 }
 
+Index CountFrameUnknowns(const CampaignModel& model) {
+  return model.frames.empty() ? 0
+                              : static_cast<Index>(kExposureParameters * (model.frames.size() - 1));
+}
+
+// Calls `each` with every unknown of the frames: its index, the spread of its prior, and its value.
+template <class Each>
+void ForFrameUnknowns(CampaignModel* model, Index begin, const Each& each) {
+  for (std::size_t frame = 1; frame < model->frames.size(); ++frame)
+    for (std::size_t k = 0; k < kExposureParameters; ++k)
+      each(begin++, kFrameSpread[k], model->frames[frame][k]);
+}
+
 void AppendHomings(const Fit& fit, const WhiteUnit& white, UnitEquations* eq) {
   PoseErrors errors;
   VectorXd column(white.y.size());
@@ -76,6 +89,19 @@ void AppendDistortions(const Fit& fit, std::size_t unit, const WhiteUnit& white,
   }
 }
 
+// The frames that the unit was seen in, but for the first.
+void AppendFrames(const Fit& fit, const WhiteUnit& white, Index begin, UnitEquations* eq) {
+  PoseErrors errors;
+  VectorXd column(white.y.size());
+  for (std::size_t frame = 1; frame < fit.model.frames.size(); ++frame)
+    for (std::size_t k = 0; k < kExposureParameters; ++k) {
+      if (!ApplyFrame(white.track, frame, k, &errors)) break;
+      WhiteDisplacement(white, errors, column.data());
+      AppendColumn(column, &eq->shared);
+      eq->shared_at.push_back(begin + static_cast<Index>(kExposureParameters * (frame - 1) + k));
+    }
+}
+
 UnitEquations MakeEquations(const Fit& fit, std::size_t unit, const WhiteUnit& white,
                             const std::vector<Index>& shared_begin) {
   UnitEquations eq;
@@ -106,6 +132,7 @@ UnitEquations MakeEquations(const Fit& fit, std::size_t unit, const WhiteUnit& w
   }
   AppendHomings(fit, white, &eq);
   AppendDistortions(fit, unit, white, shared_begin, &eq);
+  AppendFrames(fit, white, shared_begin.back(), &eq);
   return eq;
 }
 
@@ -200,6 +227,8 @@ void StepFit(Fit* fit) {
     shared_begin.push_back(shared_count);
     shared_count += static_cast<Index>(of.common.size());
   }
+  shared_begin.push_back(shared_count);
+  shared_count += CountFrameUnknowns(fit->model);
   const std::vector<UnitChunk> chunks = ChunksOf(units);
   std::vector<UnitSolution> solutions(units);
   std::vector<SharedSystem> parts(chunks.size());
@@ -225,6 +254,10 @@ void StepFit(Fit* fit) {
         all.normal(at, at) += precision;
         all.right[at] -= of.common[d] * precision;
       }
+    ForFrameUnknowns(&fit->model, shared_begin.back(), [&](Index at, double spread, double value) {
+      all.normal(at, at) += 1 / (spread * spread);
+      all.right[at] -= value / (spread * spread);
+    });
     const Eigen::LDLT<MatrixXd> solver(all.normal);
     shared = solver.solve(all.right);
     shared_sigma = solver.solve(MatrixXd::Identity(shared_count, shared_count))
@@ -237,6 +270,8 @@ void StepFit(Fit* fit) {
       const Index at = shared_begin[fit->model.terms.size() + of.of] + static_cast<Index>(d);
       of.common[d] += shared[at], of.common_sigma[d] = shared_sigma[at];
     }
+  ForFrameUnknowns(&fit->model, shared_begin.back(),
+                   [&](Index at, double, double& value) { value += shared[at]; });
   std::vector<double> mean_step(fit->model.terms.size(), 0);
   for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
     ModelTerm& term = fit->model.terms[t];
@@ -385,7 +420,7 @@ double NegativeBic(const Fit& fit) {
 
 StaticMatrix StaticCovariance(const Fit& fit, std::size_t unit) {
   const WhiteUnit white = Whiten(fit, unit);
-  std::vector<Index> none(fit.model.terms.size() + fit.model.discrepancies.size(), 0);
+  std::vector<Index> none(fit.model.terms.size() + fit.model.discrepancies.size() + 1, 0);
   const UnitEquations eq = MakeEquations(fit, unit, white, none);
   MatrixXd normal = eq.own.transpose() * eq.own;
   normal.diagonal() += eq.prior;

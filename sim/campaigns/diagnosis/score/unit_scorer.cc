@@ -58,6 +58,12 @@ SharedColumns ListShared(const CampaignModel& model, std::span<const std::size_t
       shared.value.push_back(value);
     }
   }
+  shared.begin_of_frames = shared.count;
+  for (std::size_t frame = 1; frame < model.frames.size(); ++frame)
+    for (std::size_t k = 0; k < kExposureParameters; ++k, ++shared.count) {
+      shared.precision.push_back(1 / (kFrameSpread[k] * kFrameSpread[k]));
+      shared.value.push_back(model.frames[frame][k]);
+    }
   for (const std::size_t without : withouts) {
     std::vector<Index>& columns = shared.of_look.emplace_back();
     for (std::size_t t = 0; t < model.terms.size(); ++t) {
@@ -69,6 +75,8 @@ SharedColumns ListShared(const CampaignModel& model, std::span<const std::size_t
       for (std::size_t d = 0;
            model.discrepancies[k].of != without && d < model.discrepancies[k].common.size(); ++d)
         columns.push_back(shared.begin_of_discrepancy[k] + static_cast<Index>(d));
+    for (Index column = shared.begin_of_frames; column < shared.count; ++column)
+      columns.push_back(column);
   }
   return shared;
 }
@@ -82,6 +90,7 @@ UnitScorer::UnitScorer(const Fit& fit, std::size_t unit, std::span<const std::si
   for (std::size_t t = 0; t < terms; ++t) MakeColumns(t, shared.begin_of_term[t]);
   MakeDistorted(shared);
   MakeHomings();
+  MakeFrames(shared.begin_of_frames);
   std::vector<std::size_t> plane_of(terms + 1, kNoTerm);
   for (const std::size_t without : withouts) {
     const bool own = without != kNoTerm && (own_[without].cols() > 0 || HasOwnDistorted(without));
@@ -147,6 +156,13 @@ void UnitScorer::MakeHomings() {
     ApplyHoming(white_.track, homings[h], &errors_);
     WhiteDisplacement(white_, errors_, homings_.col(static_cast<Index>(h)).data());
   }
+}
+
+void UnitScorer::MakeFrames(Index begin) {
+  for (std::size_t frame = 1; frame < fit_.model.frames.size(); ++frame)
+    for (std::size_t k = 0; k < kExposureParameters; ++k, ++begin)
+      if (ApplyFrame(white_.track, frame, k, &errors_))
+        WhiteDisplacement(white_, errors_, shared_.col(begin).data());
 }
 
 UnitScorer::Plane UnitScorer::PlaneWithout(std::size_t without) const {

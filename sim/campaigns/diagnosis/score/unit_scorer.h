@@ -58,6 +58,7 @@ std::vector<Block> PlaceInLanes(const Templates& templates);
 struct SharedColumns {
   std::vector<Eigen::Index> begin_of_term;  // kNone: its amplitudes are units' own
   std::vector<Eigen::Index> begin_of_discrepancy;
+  Eigen::Index begin_of_frames = 0;
   std::vector<double> precision, value;  // of a column's prior, and its amplitude; 0: none
   Eigen::Index count = 0;
   std::vector<std::vector<Eigen::Index>> of_look;
@@ -112,6 +113,7 @@ class UnitScorer {
            !fit_.model.discrepancies[term].own.empty();
   }
   void MakeHomings();
+  void MakeFrames(Eigen::Index begin);
   [[nodiscard]] Plane PlaneWithout(std::size_t without) const;
   void AddDistorted(std::size_t without, Plane* plane) const;
   void AddBackDistorted(std::size_t without, Eigen::VectorXd* y) const;

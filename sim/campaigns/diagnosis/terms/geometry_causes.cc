@@ -60,23 +60,29 @@ std::vector<UnitOffset> Offsets(const Fit& fit) {
 
 // Where the image moves, what the offsets of all units do alike in an exposure is the image's
 // motion as well: no table has its place. Offsets are judged without it, as if by the marginal
-// likelihood of both, in which the motions of exposures do not depend on one another.
+// likelihood of both, in which the motions of exposures do not depend on one another. Where the
+// camera has several frames, the same holds of all exposures together: no frame is the table's.
 void TakeOffTheImage(const Fit& fit, std::vector<UnitOffset>* offsets) {
   using ImageNormal = Eigen::Matrix<double, kExposureParameters, kExposureParameters>;
   using ImageVector = Eigen::Matrix<double, kExposureParameters, 1>;
   const std::vector<ExposureTerm>& exposures = fit.model.exposures;
-  std::vector<ImageNormal> normal(exposures.size(), ImageNormal::Zero());
-  std::vector<ImageVector> image(exposures.size(), ImageVector::Zero());
-  // Calls `each` with every row whose image moves: the row's index in `white`, its exposure, and
-  // the image's displacements.
+  const bool has_frames = fit.facts->frames.size() > 1;
+  if (!has_frames && std::ranges::none_of(exposures, &ExposureTerm::moves)) return;
+  // An image of each exposure, and one that all others have together.
+  const std::size_t together = exposures.size();
+  std::vector<ImageNormal> normal(together + 1, ImageNormal::Zero());
+  std::vector<ImageVector> image(together + 1, ImageVector::Zero());
+  // Calls `each` with every row whose image moves: the row's index in `white`, its image, and the
+  // image's displacements.
   const auto for_rows = [&](const WhiteUnit& white, const auto& each) {
     for (std::size_t k = 0; k < white.moves.size(); ++k) {
       const std::size_t e = fit.facts->exposures.of_row[white.track.first_row + white.moves[k]];
-      if (exposures[e].moves())
-        each(static_cast<Index>(2 * k), e, ImageDisplacements(white, k, fit.facts->radius_mm));
+      const bool moves = e < exposures.size() && exposures[e].moves();
+      if (moves || has_frames)
+        each(static_cast<Index>(2 * k), moves ? e : together,
+             ImageDisplacements(white, k, fit.facts->radius_mm));
     }
   };
-  if (std::ranges::none_of(exposures, &ExposureTerm::moves)) return;
   for (const UnitOffset& one : *offsets) {
     const WhiteUnit white = Whiten(fit, one.unit);
     const VectorXd moved_um = GeometryDisplacements(white) * one.offset;
@@ -88,7 +94,7 @@ void TakeOffTheImage(const Fit& fit, std::vector<UnitOffset>* offsets) {
     });
   }
   // An exposure of few rows leaves some of the motion open: the least motion that fits.
-  for (std::size_t e = 0; e < exposures.size(); ++e)
+  for (std::size_t e = 0; e <= together; ++e)
     image[e] = normal[e].completeOrthogonalDecomposition().solve(image[e]).eval();
   for (UnitOffset& one : *offsets) {
     const WhiteUnit white = Whiten(fit, one.unit);

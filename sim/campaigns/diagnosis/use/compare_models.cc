@@ -25,11 +25,13 @@ std::vector<double> LengthsOf(const CampaignModel& model, const CampaignFacts& f
                               const std::vector<char>& aside, const ParallelFor& parallel) {
   const Campaign& campaign = *facts.campaign;
   const Places places = Predict(model, facts, parallel);
+  Places measured{campaign.x_mm, campaign.y_mm};
+  TakeToOne(facts.frames, FitFrames(facts.frames, places, measured), {}, &measured);
   std::vector<double> lengths(campaign.rows(), kNone);
   for (std::size_t row = 0; row < lengths.size(); ++row)
     if (aside[row] == 0)
-      lengths[row] = 1e3 * std::hypot(campaign.x_mm[row] - places.x_mm[row],
-                                      campaign.y_mm[row] - places.y_mm[row]);
+      lengths[row] = 1e3 * std::hypot(measured.x_mm[row] - places.x_mm[row],
+                                      measured.y_mm[row] - places.y_mm[row]);
   return lengths;
 }
 

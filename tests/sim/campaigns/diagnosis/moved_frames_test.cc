@@ -1,0 +1,154 @@
+// Campaigns whose camera was moved between sessions, as the column frame_id says.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "sim/campaigns/diagnosis/score/score.h"
+#include "sim/campaigns/diagnosis/use/compare_models.h"
+#include "sim/campaigns/effects/registry.h"
+#include "tests/sim/campaigns/planting/moved_camera.h"
+#include "tests/sim/campaigns/planting/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+using test::MoveCamera;
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::Verdicts;
+using testing::Contains;
+using testing::Each;
+using testing::HasSubstr;
+
+// Three sessions. The camera was moved by a hundred times as much as a fibre is off by.
+void MoveBetweenSessions(Campaign* campaign) {
+  MoveCamera({{.id = 1, .until = 30},
+              {.id = 2,
+               .until = 60,
+               .shift_x_um = 700,
+               .shift_y_um = -300,
+               .turn_urad = 900,
+               .scale_ppm = 200},
+              {.id = 3, .until = 80, .shift_x_um = -50, .turn_urad = -3000}},
+             campaign);
+}
+
+// A camera that was taken off and put back: millimetres and a degree.
+TEST(MovedFrames, MayBeFarApart) {
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 9});
+  const Diagnosis expected = Verdicts(campaign);
+  MoveCamera({{.id = 1, .until = 38},
+              {.id = 2, .until = 80, .shift_x_um = 9000, .shift_y_um = 4000, .turn_urad = 2e4}},
+             &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  EXPECT_EQ(Reported(diagnosis), Reported(expected));
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+    EXPECT_NEAR(diagnosis.model.units[unit].base_x_mm, campaign.units[unit].base_x_mm, 0.1)
+        << "a model of the frame that is not the table's";
+}
+
+// No frame is that of the table: what all units are off by alike is where the camera stood.
+TEST(MovedFrames, MayAllDifferFromTheTable) {
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 9});
+  MoveCamera({{.id = 1, .until = 38, .shift_x_um = 300, .turn_urad = -2000, .scale_ppm = 500},
+              {.id = 2, .until = 80, .shift_y_um = -400, .turn_urad = 1500}},
+             &campaign);
+  EXPECT_EQ(Reported(Verdicts(campaign)), "consistent");
+}
+
+void ForgetFrames(Campaign* campaign) {
+  std::erase_if(campaign->covariates, [](const Covariate& one) { return one.name == "frame_id"; });
+}
+
+TEST(MovedFrames, AreNoEffect) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Campaign still = Planted({}, {.units = 24, .moves = 80, .seed = seed});
+    const Diagnosis expected = Diagnose(still, {.with_next_moves = false});
+    Campaign moved = still;
+    MoveBetweenSessions(&moved);
+    const Diagnosis diagnosis = Diagnose(moved, {.with_next_moves = false});
+    EXPECT_EQ(Reported(diagnosis), Reported(expected)) << seed;
+    EXPECT_EQ(diagnosis.verdict, expected.verdict) << seed;
+    EXPECT_NEAR(diagnosis.gain.rms_after_um, expected.gain.rms_after_um,
+                0.05 * expected.gain.rms_after_um)
+        << seed;
+    EXPECT_THAT(diagnosis.remarks, Contains(HasSubstr("in frame 2 the camera stands otherwise")));
+    EXPECT_TRUE(diagnosis.model.frames.empty()) << "they are the campaign's own";
+  }
+}
+
+TEST(MovedFrames, AreSeenWhereNoColumnNamesThem) {
+  Campaign moved = Planted({}, {.units = 24, .moves = 40, .seed = 1});
+  MoveBetweenSessions(&moved);
+  ForgetFrames(&moved);
+  EXPECT_NE(Verdicts(moved).verdict, Verdict::kConsistent) << "the motion was too small";
+}
+
+TEST(MovedFrames, LeaveEffectsTheirNamesAndSizes) {
+  for (const PlantedEffect& effect :
+       {PlantedEffect{"backlash", 0.1}, PlantedEffect{"eccentricity", 0.1}}) {
+    SCOPED_TRACE(effect.cause);
+    const Campaign still = Planted({effect}, {.units = 24, .moves = 80, .seed = 4});
+    const Diagnosis expected = Verdicts(still);
+    ASSERT_EQ(expected.causes.size(), 1u) << Reported(expected);
+    Campaign moved = still;
+    MoveBetweenSessions(&moved);
+    const Diagnosis diagnosis = Verdicts(moved);
+    ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
+    EXPECT_EQ(diagnosis.causes[0].candidates, expected.causes[0].candidates);
+    EXPECT_NEAR(diagnosis.causes[0].amplitude, expected.causes[0].amplitude,
+                0.02 * std::abs(expected.causes[0].amplitude));
+  }
+}
+
+// Small motions, which no alignment before the fit has taken away.
+TEST(MovedFrames, AreFittedAsUnknowns) {
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 7});
+  MoveCamera({{.id = 1, .until = 45},
+              {.id = 2,
+               .until = 80,
+               .shift_x_um = 20,
+               .shift_y_um = -8,
+               .turn_urad = 300,
+               .scale_ppm = -200}},
+             &campaign);
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Fit fit = StaticFit(facts);
+  ASSERT_EQ(fit.model.frames.size(), 2u);
+  EXPECT_THAT(fit.model.frames[0], Each(0.0));
+  // Errors of means of some 800 rows of 5 um, and at 20 mm from the centre.
+  EXPECT_NEAR(fit.model.frames[1][0], 20, 1.5);
+  EXPECT_NEAR(fit.model.frames[1][1], -8, 1.5);
+  EXPECT_NEAR(fit.model.frames[1][2], 300, 80);
+  EXPECT_NEAR(fit.model.frames[1][3], -200, 80);
+  EXPECT_LT(MedianMiss_um(fit), 6);
+}
+
+// A shift of the image just between two frames is the frames' own.
+TEST(MovedFrames, EarnAnEffectNothing) {
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 7});
+  MoveCamera({{.id = 1, .until = 39}, {.id = 2, .until = 80}}, &campaign);
+  const CampaignFacts facts = MakeFacts(campaign);
+  Templates shift = ListTemplates(*FindEffect("camera_similarity"), facts);
+  ASSERT_FALSE(shift.empty());
+  shift = {WithShape(shift[0], 39), WithShape(shift[0], 20)};
+  const ScorePass pass = ScoreTemplates(StaticFit(facts), shift);
+  EXPECT_LT(pass.scores[0].fleet_g.norm(), 1e-6 * pass.scores[1].fleet_g.norm());
+}
+
+TEST(MovedFrames, AreNoDifferenceOfModels) {
+  Campaign moved = Planted({}, {.units = 24, .moves = 80, .seed = 6});
+  CampaignModel table, off;
+  table.units = off.units = moved.units;
+  for (CampaignUnit& unit : off.units) unit.arm_mm[kTheta] += 0.02;
+  MoveBetweenSessions(&moved);
+  const ModelComparison compared = CompareModels({&table, &off}, moved, {});
+  EXPECT_LT(compared.a.rms_um, compared.b.rms_um);
+  EXPECT_LT(compared.a.rms_um, 50) << "the frames were not taken to one";
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
