@@ -65,8 +65,9 @@ class Matching {
     settled_[unit] = 1;
   }
 
-  // Candidates are units that were commanded to move and have no spot near the end of the move.
-  // Their spots are all but those that are the only one at the end of a unit's move.
+  // Candidates are units that were commanded to move and have no spot near the end of the move. A
+  // lost unit reports a place, which is no command. Their spots are all but those that are the only
+  // one at the end of a unit's move.
   void TakeSwaps() {
     std::vector<std::uint32_t> ends(settled_.size(), 0);
     for (const Claim& claim : claims_.all)
@@ -76,7 +77,8 @@ class Matching {
       if (claim.kind == PlaceKind::kExpected && ends[claim.unit] == 1) is_free[claim.spot] = 0;
     std::vector<std::uint32_t> units;
     for (std::uint32_t i = 0; i < ends.size(); ++i)
-      if (ends[i] == 0 && request_.expectations[i].commanded && request_.expectations[i].moved)
+      if (ends[i] == 0 && request_.expectations[i].commanded && request_.expectations[i].moved &&
+          !request_.expectations[i].lost)
         units.push_back(i);
     const SwapFindings found =
         FindSwaps({&request_, &options_, &spots_, search_.grid, units, is_free, claims_.all});
@@ -99,13 +101,19 @@ class Matching {
     std::vector<Claim> open;
     for (const Claim& claim : claims_.all)
       if (settled_[claim.unit] == 0 && is_free_[claim.spot] != 0) open.push_back(claim);
-    const std::vector<Decision> decisions = Assign(open);
+    const std::vector<Decision> decisions = AssignWithLost(&open);
     for (const Decision& decision : decisions) {
       if (decision.spot != kNoSpot && decision.doubt <= options_.doubt_max) GiveExpected(decision);
     }
     // A spot that an undecided unit could have is not assigned to another either.
-    for (const Decision& decision : decisions)
-      if (decision.doubt > options_.doubt_max) LeaveAmbiguous(decision.unit, decision.doubt);
+    for (const Decision& decision : decisions) {
+      if (decision.doubt <= options_.doubt_max) continue;
+      if (decision.spot != kNoSpot && request_.expectations[decision.unit].lost &&
+          decision.doubt <= options_.stray_doubt_max)
+        Give(decision.unit, decision.spot, MeasurementStatus::kStrayed, decision.doubt);
+      else
+        LeaveAmbiguous(decision.unit, decision.doubt);
+    }
     for (const Claim& claim : open) {
       const bool undecided = measurements_[claim.unit].status == MeasurementStatus::kAmbiguous;
       if (undecided && is_free_[claim.spot] != 0) {
@@ -113,6 +121,29 @@ class Matching {
         held_.push_back(claim.spot);
       }
     }
+  }
+
+  // A lost unit may have any spot that it reaches, also one where another unit is expected. Such
+  // claims are decided together with the others where the answers can be counted. They are too many
+  // where most units are lost and reach far into each other's areas: claims on expected places are
+  // then decided by themselves. `open` becomes the claims that were decided.
+  std::vector<Decision> AssignWithLost(std::vector<Claim>* open) {
+    std::vector<std::uint32_t> lost;
+    for (const std::uint32_t unit : Open())
+      if (request_.expectations[unit].lost) lost.push_back(unit);
+    std::vector<Claim> all = *open;
+    const std::vector<Claim> anywhere = FindStrays(search_, lost, is_free_);
+    all.insert(all.end(), anywhere.begin(), anywhere.end());
+    std::vector<Decision> decisions = Assign(all);
+    std::vector<char> is_too_large(settled_.size(), 0);
+    for (const Decision& decision : decisions)
+      if (decision.too_large) is_too_large[decision.unit] = 1;
+    std::erase_if(decisions, &Decision::too_large);
+    std::erase_if(all, [&](const Claim& claim) { return is_too_large[claim.unit] != 0; });
+    std::erase_if(*open, [&](const Claim& claim) { return is_too_large[claim.unit] == 0; });
+    for (const Decision& decision : Assign(*open)) decisions.push_back(decision);
+    open->insert(open->end(), all.begin(), all.end());
+    return decisions;
   }
 
   void GiveExpected(const Decision& decision) {
