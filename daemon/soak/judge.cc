@@ -42,6 +42,12 @@ constexpr std::size_t kBatchesAnyway = 200;
 /// A row may be so much older than its commit, where the disk fails.
 constexpr DurationNs kRowHeld = Seconds(30);
 
+std::size_t BusOf(const Plant& plant, std::size_t row) {
+  const auto buses = plant.layout().buses();
+  const auto at = std::lower_bound(buses.begin(), buses.end(), plant.layout().units()[row].bus);
+  return static_cast<std::size_t>(at - buses.begin());
+}
+
 }  // namespace
 
 Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* troubles,
@@ -57,7 +63,8 @@ Judge::Judge(const Plant* plant, const MemoryDisk* disk, const Troubles* trouble
       frames_most_(plant->layout().buses().size()) {
   const auto units = plant->layout().units();
   near_.resize(units.size());
-  for (std::size_t row = 0; row < units.size(); ++row) frames_most_[BusOf(row)] += kFramesOfUnit;
+  for (std::size_t row = 0; row < units.size(); ++row)
+    frames_most_[BusOf(*plant, row)] += kFramesOfUnit;
   for (std::size_t i = 0; i < units.size(); ++i)
     for (std::size_t j = i + 1; j < units.size(); ++j) {
       const double apart = std::hypot(units[i].base_fp.x_mm - units[j].base_fp.x_mm,
@@ -74,12 +81,6 @@ void Judge::Broken(const std::string& rule, const std::string& what) {
   if (broken_.size() < kBrokenMax)
     broken_.push_back(
         fmt::format("{:.3f} s: {}: {}", 1e-9 * static_cast<double>(now_.ns), rule, what));
-}
-
-std::size_t Judge::BusOf(std::size_t row) const {
-  const auto buses = plant_->layout().buses();
-  const auto at = std::lower_bound(buses.begin(), buses.end(), plant_->layout().units()[row].bus);
-  return static_cast<std::size_t>(at - buses.begin());
 }
 
 void Judge::LifeHasBegun() {
@@ -221,17 +222,21 @@ bool Judge::HasPlace(std::size_t row) const {
   return place != acknowledged().places.end() && IsExact(place->second);
 }
 
+bool Judge::IsItsOnlyWitness(std::size_t row) const {
+  if (troubles_->counts_lost[row] == Troubles::kLongAgo) return false;
+  const UnitId unit = plant_->layout().units()[row].id;
+  const auto known = stored_.find(plant_->world().flash(unit).serial.value);
+  return known == stored_.end() || troubles_->counts_lost[row] <= known->second.first;
+}
+
 void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
   const auto unit = acknowledged().units.find(truth.id.value);
   if (unit == acknowledged().units.end()) return;
   const std::uint32_t serial = unit->second.serial;
   // Other hardware at this place has a place of its own; the store speaks of what was bound here.
   if (serial != plant_->world().flash(truth.id).serial.value) return;
-  // At its first contact a unit has no witness but its own counts.
+  if (IsItsOnlyWitness(row)) return;
   const auto known = stored_.find(serial);
-  if (troubles_->counts_lost[row] != Troubles::kLongAgo &&
-      (known == stored_.end() || troubles_->counts_lost[row] <= known->second.first))
-    return;
   const auto place = acknowledged().places.find(serial);
   const auto intent = acknowledged().intents.find(serial);
   const std::vector<HostInstant>& cuts = troubles_->jumps[row];
@@ -313,7 +318,8 @@ void Judge::LookForContact(std::span<const sim::UnitTruth> truths) {
       const HostInstant since = now_ - kContactAfter;
       bool excused = risk_ || (!host_alone_ && troubles_->away > since);
       for (const std::size_t row : {i, j})
-        excused = excused || troubles_->buses[BusOf(row)] > since || troubles_->deaf[row] > since;
+        excused = excused || troubles_->buses[BusOf(*plant_, row)] > since ||
+                  troubles_->deaf[row] > since || IsItsOnlyWitness(row);
       if (!excused)
         Broken("contact", fmt::format("units {} and {} touch, {:.3f} mm apart", units[i].id.value,
                                       units[j].id.value, apart));

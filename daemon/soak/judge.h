@@ -88,12 +88,14 @@ class Judge {
   /// The callback of the judges that it is made of.
   StoreJudge::Broken Tells();
   void LookAtStarts(std::size_t row, const sim::UnitTruth& truth);
+  /// Whether the unit's FLASH had false counts before the store first had its place. At its first
+  /// contact a unit has no other witness.
+  [[nodiscard]] bool IsItsOnlyWitness(std::size_t row) const;
   void LookAtPlace(std::size_t row, const sim::UnitTruth& truth);
   void LookAtFibre(std::size_t row, const sim::UnitTruth& truth, const StoredPlace& place);
   void LookForContact(std::span<const sim::UnitTruth> truths);
   void NoteBlind(std::span<const Row> rows);
   void NoteSeen(const VectorRow& vector);
-  [[nodiscard]] std::size_t BusOf(std::size_t row) const;
 
   const Plant* plant_;
   const Troubles* troubles_;

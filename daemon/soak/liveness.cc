@@ -122,26 +122,40 @@ void Liveness::HomeLost() {
 
 /// Arms that a fault has driven into each other are parted by hand by day. Until then people leave
 /// them out, as the runbook says of units that may touch. A fault of one unit drives it into one or
-/// two others. Returns how many units are left out.
-std::size_t Liveness::LeaveOutTouching() {
-  constexpr std::size_t kMost = 6;
+/// two others, and one of all buses does so to some of each. Returns the units that are left out.
+std::vector<std::uint32_t> Liveness::LeaveOutTouching() {
+  const std::size_t most = std::max<std::size_t>(6, parts_.layout->size() / 100);
   const std::vector<std::uint32_t> units = parts_.judge->TouchingUnits();
-  if (units.empty()) return 0;
+  if (units.empty()) return units;
   parts_.tell(fmt::format("{} units touch, and are left out", units.size()));
   const std::uint64_t request =
       parts_.operators->Ask("disable", {{"unit_ids", units}, {"reason", "they touch"}});
   if (!WaitFor(request, 30) ||
       parts_.operators->Answer(request)->kind == ControlAnswer::Kind::kError)
     parts_.judge->Broken("liveness", "units that touch cannot be disabled");
-  if (units.size() > kMost)
+  if (units.size() > most)
     parts_.judge->Broken("liveness", fmt::format("{} units touch", units.size()));
-  return units.size();
+  return units;
+}
+
+/// Units that the answer calls blocked, and that stand beside one of those that were left out.
+std::size_t Liveness::BlockedBeside(std::span<const std::uint32_t> left_out,
+                                    const nlohmann::json& answer) const {
+  const Layout& layout = *parts_.layout;
+  return static_cast<std::size_t>(std::ranges::count_if(
+      answer.value("unserved", nlohmann::json::array()), [&](const nlohmann::json& unserved) {
+        const auto unit = layout.Find({unserved.value("unit_id", 0u)});
+        if (!unit || unserved.value("reason", "") != "blocked") return false;
+        return std::ranges::any_of(layout.neighbours(*unit), [&](PositionerIndex near) {
+          return std::ranges::count(left_out, layout.unit(near).id.value) > 0;
+        });
+      }));
 }
 
 /// The fleet carries out a configuration whole, and the store, the truth and the answer agree.
 void Liveness::CheckEnd() {
   parts_.judge->RiskTaken(false);
-  const std::size_t left_out = LeaveOutTouching();
+  const std::vector<std::uint32_t> left_out = LeaveOutTouching();
   constexpr int kTries = 4;
   std::string why = "no try";
   bool arrived = false;
@@ -165,7 +179,8 @@ void Liveness::CheckEnd() {
       continue;
     }
     why = answer->body.dump();
-    arrived = answer->body.value("arrived", 0u) == parts_.layout->size() - left_out;
+    arrived = answer->body.value("arrived", 0u) + BlockedBeside(left_out, answer->body) ==
+              parts_.layout->size() - left_out.size();
   }
   if (good() && !arrived)
     parts_.judge->Broken("liveness", "no configuration is carried out whole: " + why);

@@ -44,7 +44,9 @@ class Liveness {
   void SetRight();
   void ClearFaults();
   void HomeLost();
-  std::size_t LeaveOutTouching();
+  std::vector<std::uint32_t> LeaveOutTouching();
+  [[nodiscard]] std::size_t BlockedBeside(std::span<const std::uint32_t> left_out,
+                                          const nlohmann::json& answer) const;
   void CheckEnd();
 
   Parts parts_;

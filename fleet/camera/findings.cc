@@ -21,6 +21,7 @@ namespace {
 constexpr BlindError kNeverSeen{
     .theta_sigma_deg = 0.7, .phi_sigma_deg = 0.7, .place_sigma_mm = 0.06};
 constexpr BlindError kSeen{.theta_sigma_deg = 0.35, .phi_sigma_deg = 0.35, .place_sigma_mm = 0.04};
+const BlindError& BlindOf(bool seen) { return seen ? kSeen : kNeverSeen; }
 constexpr double kMeasuredSigmaMm = 0.005;  // of a unit that rests where a camera saw it
 
 bool IsMeasured(const UnitKnowledge& knowledge) {
@@ -77,7 +78,7 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
     all[n] = ExpectMove(
         unit,
         believed.before[n] ? AnglesOf(unit, believed.drives[n], *believed.before[n]) : commanded,
-        commanded, believed.seen[n] != 0 ? kSeen : kNeverSeen);
+        commanded, BlindOf(believed.seen[n] != 0));
     // The place of this unit is only reported: it is no light of known place for the camera.
     all[n].moved = true;
   }
@@ -139,6 +140,15 @@ std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp
   return PlaceSeen(unit, drive, seen_fp, pose, {.sigma_mm = sigma_mm});
 }
 
+std::optional<Pose> PoseOfKnown(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
+                                const Pose& believed, const KnownSeen& with) {
+  SeenWith seen_with{.sigma_mm = with.sigma_mm};
+  const auto at_fp = InReach(unit, seen_fp, kStraySlackMm);
+  if (at_fp && !IsElbowKnown(unit, *at_fp, with.sigma_mm, with.clearance_mm))
+    seen_with.believed_deg = BlindOf(with.was_seen).theta_sigma_deg;
+  return PlaceSeen(unit, drive, seen_fp, believed, seen_with);
+}
+
 Result<ExposureFindings> FindUnits(std::uint64_t id, const Layout& layout, const Believed& believed,
                                    const CameraSite& site, const Exposure& exposure) {
   const std::vector<UnitExpectation> expectations = Expect(layout, believed);
@@ -167,9 +177,11 @@ Result<ExposureFindings> FindUnits(std::uint64_t id, const Layout& layout, const
                                        expectations[n], sigma_mm, layout.clearance_mm());
       else if (IsCertain(seen.status))
         measurement.place =
-            PlaceSeen(layout.units()[n], believed.drives[n], seen.at_fp,
-                      BelievedPose(seen, PlaceOf(believed.now[n]), believed.before[n]),
-                      {.sigma_mm = sigma_mm});
+            PoseOfKnown(layout.units()[n], believed.drives[n], seen.at_fp,
+                        BelievedPose(seen, PlaceOf(believed.now[n]), believed.before[n]),
+                        {.sigma_mm = sigma_mm,
+                         .clearance_mm = layout.clearance_mm(),
+                         .was_seen = believed.seen[n] != 0});
     }
     findings.measurements.push_back(std::move(measurement));
   }

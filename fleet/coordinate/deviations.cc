@@ -19,11 +19,13 @@ std::optional<Deviation> DeviationOf(const Coordination& fleet, const Round& rou
   const bool as_planned =
       part == Part::kMoving && unit.view.phase == UnitPhase::kMoving && unit.motion.runs_freely;
   const bool to_start = part != Part::kMoving && part != Part::kNone;
+  const auto is_over_at = [&](const UnitKnowledge& end) {
+    return !round[i].ended_early && IsWhere(unit.view.knowledge, end);
+  };
   if (const LateMove* const late = round.LateOf(i)) {
-    if (as_planned || to_start ||
-        IsWhere(unit.view.knowledge, Exactly(Witness::kReported, late->move.to)))
+    if (as_planned || to_start || is_over_at(Exactly(Witness::kReported, late->move.to)))
       return Deviation{i, {}, *late};
-  } else if (as_planned || IsWhere(unit.view.knowledge, round.running->PlannedEnd(i))) {
+  } else if (as_planned || is_over_at(round.running->PlannedEnd(i))) {
     return std::nullopt;
   }
   return Deviation{i, unit.view.knowledge, std::nullopt};

@@ -44,7 +44,10 @@ std::optional<Round::Course> Round::CourseOf(PositionerIndex i) const {
 
 void Round::TakePlan(const Plan& next) {
   // A round that was disarmed has not ended: its units still have their numbers.
-  for (RoundUnit& unit : units_) unit.plan = RoundUnit::kNoPlan;
+  for (RoundUnit& unit : units_) {
+    unit.plan = RoundUnit::kNoPlan;
+    unit.ended_early = false;
+  }
   plan = next;
 }
 
@@ -53,6 +56,7 @@ void Round::AddLate(PositionerIndex i, const LateMove& late, MoveId move_id) {
   units_[i.value].plan = plan.moves.size();
   plan.moves.push_back(late.move);
   units_[i.value].stage_tries = 0;
+  units_[i.value].ended_early = false;
 }
 
 void Round::DropLate(PositionerIndex i) {

@@ -46,6 +46,9 @@ struct RoundUnit {
   Part part = Part::kNone;
   std::uint8_t stage_tries = 0;
   std::uint8_t goes_on = 0;  // how often it was taken up again in this round
+  // Its move has ended before it can have been over. The unit then stands, also where its move
+  // ends: one that makes way and comes back has its end where it began.
+  bool ended_early = false;
   std::optional<Before> before;
 };
 

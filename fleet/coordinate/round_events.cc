@@ -10,12 +10,18 @@ namespace {
 
 using enum UnitPhase;
 
+void NoteWhetherEarly(PositionerIndex i, ExecutorRooms* rooms) {
+  const auto course = rooms->round.CourseOf(i);
+  rooms->round[i].ended_early = course && !MayHaveArrived(rooms->fleet, rooms->round, *course);
+}
+
 /// The motion of the unit has ended, and its place is settled as far as it can be.
 void EndMotion(PositionerIndex i, UnitEventKind how, ExecutorRooms* rooms) {
   const Coordination& fleet = rooms->fleet;
   Configuration& configuration = rooms->configuration;
   Round& round = rooms->round;
   const UnitView& view = fleet.units[i].view;
+  NoteWhetherEarly(i, rooms);
   round.last_arrival = std::max(round.last_arrival, fleet.now());
   round.settled_batch = fleet.ledger.batch_now();
   configuration[i].ended = fleet.now();
@@ -54,10 +60,12 @@ void Lose(PositionerIndex i, const std::string& reason, ExecutorRooms* rooms) {
       phase == kFault ? "it " + fleet.units.TroubleOf(i) : "it " + reason);
   rooms->configuration[i].excluded = true;
   // A silent unit may move on, and end later.
-  if (rooms->round.part(i) == Part::kMoving)
+  if (rooms->round.part(i) == Part::kMoving) {
+    NoteWhetherEarly(i, rooms);
     StopFollowers(fleet, rooms->round, i,
                   SeenUntil(fleet, i, phase == kSilent ? kNever : fleet.now()),
                   fleet.units.NameOf(i) + " may stand in its way");
+  }
   rooms->upload.Leave(i);
 }
 

@@ -86,6 +86,21 @@ TEST(Regression, Seed426_AFollowerThatIsNotHeardIsStopped) {
 // Somebody disables a unit that another has just enabled: both are answered after one commit.
 TEST(Regression, Seed40049_TwoWhoDisagreeAreBothAnsweredTruly) { ExpectKept(40049); }
 
+// A lost unit whose fibre was dark was given the fibre of another lost unit.
+TEST(Regression, Seed201040_LostUnitsAreNotTakenForEachOther) {
+  ExpectKept(201040, RunSeed(201040, 0, DrawKinds::kAll));
+}
+
+// A unit that makes way and comes back lost power before it began, and passed for out of the way.
+TEST(Regression, Seed201098_AUnitThatNeverMadeWayIsInTheWay) {
+  ExpectKept(201098, RunSeed(201098, 0, DrawKinds::kAll));
+}
+
+// The theta angle of a folded arm was measured by spots that tell nothing of it.
+TEST(Regression, Seed203409_AFoldedArmStaysAsItIsBelieved) {
+  ExpectKept(203409, RunSeed(203409, 0, DrawKinds::kAll));
+}
+
 // The judge's own parts must be able to see what they look for.
 
 StoreOptions On(const MemoryDisk& disk) { return {.vfs = disk.name(), .vfs_has_files = true}; }

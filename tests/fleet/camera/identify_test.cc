@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/fleet/camera/identify_fixture.h"
 #include "tests/support/camera_field.h"
 #include "tests/support/seed.h"
 
@@ -16,75 +17,9 @@ namespace {
 using test::CameraField;
 using test::FieldTroubles;
 using test::Judgement;
+using test::kNoTroubles;
 using Complex = std::complex<double>;
-
-constexpr FieldTroubles kNoTroubles{
-    .tail_share = 0, .dead_share = 0, .slipping_share = 0, .disabled_share = 0, .swaps = 0};
-
-class Identify : public ::testing::Test {
- protected:
-  Identify() {
-    traits_ = test::TestCamera(Rim());
-    traits_.missing_share = 0;
-    traits_.extra_share = 0;
-  }
-
-  [[nodiscard]] double Rim() const {
-    double rim_mm = 0;
-    for (const Unit& unit : field_.layout().units())
-      rim_mm = std::max(rim_mm, std::hypot(unit.base_fp.x_mm, unit.base_fp.y_mm));
-    return rim_mm;
-  }
-
-  void Picture(std::vector<sim::LightSource> sources) {
-    image_ = sim::TakeImage(sources, traits_, &field_.rng());
-    exposure_ = test::ExposureOf(image_, "1");
-  }
-
-  tl::expected<Identification, Refusal> Ask(const std::vector<UnitExpectation>& expectations) {
-    return focalfleet::Identify({.layout = &field_.layout(),
-                                 .expectations = expectations,
-                                 .fiducials = field_.fiducials(),
-                                 .camera = &model_,
-                                 .exposure = &exposure_},
-                                options_);
-  }
-
-  Identification See() {
-    Picture(field_.Sources());
-    auto result = Ask(field_.Expectations());
-    EXPECT_TRUE(result) << (result ? "" : result.error().text);
-    return result ? std::move(*result) : Identification{};
-  }
-
-  std::string RefusedAs() {
-    const auto result = Ask(field_.Expectations());
-    return result ? "" : Name(result.error().reason);
-  }
-
-  static std::uint32_t Count(const Identification& seen, MeasurementStatus status) {
-    return seen.count[static_cast<std::size_t>(status)];
-  }
-
-  /// The k-th of the healthy units whose fibre moved far.
-  std::uint32_t FarMover(int k) {
-    for (std::uint32_t i = 0; i < field_.units().size(); ++i) {
-      const auto& unit = field_.units()[i];
-      const bool far = std::abs(unit.before.theta_deg - unit.commanded.theta_deg) > 30 &&
-                       std::abs(unit.before.phi_deg - unit.commanded.phi_deg) > 20;
-      if (far && k-- == 0) return i;
-    }
-    ADD_FAILURE();
-    return 0;
-  }
-
-  CameraField field_{{.count = 217, .fiducials = 24}, test::TestSeed(1)};
-  sim::CameraTraits traits_;
-  CameraModel model_ = test::ModelOf(test::TestCamera(Rim()));
-  IdentifyOptions options_;
-  sim::Image image_;
-  Exposure exposure_;
-};
+using Identify = test::IdentifyTest;
 
 TEST_F(Identify, AHealthyFleetIsMeasuredWithinItsErrors) {
   field_.Move(kNoTroubles);
@@ -189,71 +124,6 @@ TEST_F(Identify, AUnitThatStoppedOnItsWayHasStrayed) {
   ASSERT_NE(seen.units[i].spot, kNoSpot);
   EXPECT_EQ(image_.light[seen.units[i].spot], std::vector<std::uint32_t>{i});
   EXPECT_FALSE(IsCertain(seen.units[i].status));
-}
-
-TEST_F(Identify, AUnitOfUnknownPlaceIsFoundByElimination) {
-  field_.Move(kNoTroubles);
-  auto expectations = field_.Expectations();
-  expectations[30] = {};
-  Picture(field_.Sources());
-  const auto seen = Ask(expectations);
-  ASSERT_TRUE(seen);
-  EXPECT_EQ(seen->units[30].status, MeasurementStatus::kStrayed);
-  ASSERT_NE(seen->units[30].spot, kNoSpot);
-  EXPECT_EQ(image_.light[seen->units[30].spot], std::vector<std::uint32_t>{30});
-}
-
-// Power was lost in mid-move: the units report where their moves began, and are anywhere on the
-// way. Many of them never left. A dark one's report may then lead to the fibre of another lost one.
-TEST_F(Identify, LostUnitsAreTakenForEachOtherAsSeldomAsStated) {
-  constexpr BlindError kBlind{.theta_sigma_deg = 0.7, .phi_sigma_deg = 0.7, .place_sigma_mm = 0.06};
-  constexpr double kSlack_deg = 3;
-  constexpr double kSurest = 1e-5;  // doubt: one of many in which two claims agree
-  const std::uint64_t seed = test::TestSeed(1);
-  FOCALFLEET_TRACE_SEED(seed);
-  Rng rng = Rng::Stream(seed, "interrupted");
-  traits_.missing_share = 0.05;
-  options_.shares.missing = traits_.missing_share;
-  double stated = 0;
-  std::uint32_t wrong = 0, found = 0, surest = 0, swapped = 0;
-  for (int k = 0; k < 100; ++k) {
-    field_.Move(kNoTroubles);
-    auto expectations = field_.Expectations();
-    for (std::uint32_t i = 0; i < expectations.size(); ++i) {
-      if (rng.Uniform() < 0.3) continue;
-      test::PlantedUnit& unit = field_.units()[i];
-      const double way = rng.Uniform() < 0.5 ? rng.Uniform(0, 0.05) : rng.Uniform();
-      AxisAngles at = unit.before;
-      at.theta_deg += way * (unit.commanded.theta_deg - unit.before.theta_deg);
-      at.phi_deg += way * (unit.commanded.phi_deg - unit.before.phi_deg);
-      unit.place_mm = field_.PlaceOf(i, at);
-      const auto range = [](double a, double b) {
-        return AngleBox::Range{std::min(a, b) - kSlack_deg, std::max(a, b) + kSlack_deg};
-      };
-      const AngleBox box{{range(unit.before.theta_deg, unit.commanded.theta_deg),
-                          range(unit.before.phi_deg, unit.commanded.phi_deg)}};
-      expectations[i] = ExpectLost(field_.layout().unit({i}), unit.before, box, kBlind);
-    }
-    Picture(field_.Sources());
-    const auto seen = Ask(expectations);
-    ASSERT_TRUE(seen) << seen.error().text;
-    for (std::uint32_t i = 0; i < expectations.size(); ++i) {
-      const UnitMeasurement& one = seen->units[i];
-      if (one.status == MeasurementStatus::kSwapped) ++swapped;
-      if (!IsCertain(one.status)) continue;
-      ++found;
-      if (!(one.doubt < kSurest)) continue;
-      ++surest;
-      stated += one.doubt;
-      const std::vector<std::uint32_t>& light = image_.light[one.spot];
-      if (std::ranges::count(light, i) == 0) ++wrong;
-    }
-  }
-  EXPECT_GT(found, 0.8 * 217 * 100) << "of all";
-  EXPECT_EQ(swapped, 0u) << "a report is no command";
-  EXPECT_GT(surest, 10'000u);
-  EXPECT_LT(stated, 0.01) << "chance would make one wrong in a hundred runs";
-  EXPECT_EQ(wrong, 0u);
 }
 
 TEST_F(Identify, TwoThatStrayedIntoACommonAreaAreAmbiguous) {
