@@ -86,8 +86,11 @@ void Judge::Broken(const std::string& rule, const std::string& what) {
 void Judge::LifeHasBegun() {
   store_.LifeHasBegun();
   reported_.clear();
-  for (const auto& [serial, place] : store_.acknowledged().places)
+  // A commit may be durable that the life before did not live to hear of.
+  for (const auto& [serial, place] : store_.acknowledged().places) {
     reported_[serial].push_back(place);
+    NoteSeen(serial, place);
+  }
 }
 
 void Judge::Committed(std::span<const Row> rows, bool done) {
@@ -100,7 +103,7 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
       const HostInstant at{ReadVirtualNs()};
       stored_.try_emplace(vector->serial.value, Stored{at, at, kLagVectors}).first->second.last =
           at;
-      NoteSeen(*vector);
+      NoteSeen(vector->serial.value, PlaceOf(*vector));
       auto& places = reported_[vector->serial.value];
       places.push_back(PlaceOf(*vector));
       if (places.size() > kReportedMax) places.pop_front();
@@ -269,19 +272,20 @@ void Judge::LookAtPlace(std::size_t row, const sim::UnitTruth& truth) {
 }
 
 /// The count of a unit keeps the error with which its place was measured last.
-void Judge::NoteSeen(const VectorRow& vector) {
-  const auto unit = std::ranges::find_if(acknowledged().units, [&](const auto& each) {
-    return each.second.serial == vector.serial.value;
-  });
-  if (vector.knowledge[1].witness != Witness::kMeasured || unit == acknowledged().units.end())
+void Judge::NoteSeen(std::uint32_t serial, const StoredPlace& place) {
+  constexpr int kMeasured = 4;
+  const auto known = stored_.find(serial);
+  const auto unit = std::ranges::find_if(
+      acknowledged().units, [&](const auto& each) { return each.second.serial == serial; });
+  if (place[1].witness != kMeasured || known == stored_.end() || unit == acknowledged().units.end())
     return;
   const auto row = plant_->layout().Find(UnitId{unit->first});
   if (!row) return;
   const Unit& arm = plant_->layout().unit(*row);
   const double phi_deg = arm.axis[1].zero_deg +
-                         static_cast<double>(vector.knowledge[1].low) *
+                         static_cast<double>(place[1].low) *
                              DegreesPerVector(arm.axis[1], plant_->drives()[row->value].axis[1]);
-  stored_[vector.serial.value].slack_vectors =
+  known->second.slack_vectors =
       std::abs(phi_deg) < kStretchedDeg ? kSeenStretchedVectors : kSeenVectors;
 }
 

@@ -95,7 +95,7 @@ class Judge {
   void LookAtFibre(std::size_t row, const sim::UnitTruth& truth, const StoredPlace& place);
   void LookForContact(std::span<const sim::UnitTruth> truths);
   void NoteBlind(std::span<const Row> rows);
-  void NoteSeen(const VectorRow& vector);
+  void NoteSeen(std::uint32_t serial, const StoredPlace& place);
 
   const Plant* plant_;
   const Troubles* troubles_;
