@@ -73,8 +73,11 @@ std::uint64_t Operators::Ask(const std::string& verb, Json args) {
   if (args.contains("unit_id")) open_[client].unit = UnitId{args["unit_id"].get<std::uint32_t>()};
   if (args.contains("unit_ids") && args["unit_ids"].size() == 1)
     open_[client].unit = UnitId{args["unit_ids"][0].get<std::uint32_t>()};
-  if (open_[client].unit && (verb == "enable" || verb == "disable"))
-    newest_change_[open_[client].unit->value] = client;
+  if (verb == "enable" || verb == "disable")
+    for (const Json& unit : args["unit_ids"]) {
+      open_[client].changes.push_back(unit.get<std::uint32_t>());
+      newest_change_[open_[client].changes.back()] = client;
+    }
   if (verb == "apply" || verb == "home" || verb == "retarget" || verb == "measure")
     parts_.judge->stops().MotionCommanded(HostInstant{ReadVirtualNs()});
   if (verb == "stop")
@@ -221,15 +224,15 @@ void Operators::CheckAnswer(std::uint64_t client, const Open& open, const Contro
   if (answer.kind != ControlAnswer::Kind::kResult) return;
   if (open.verb == "stop" && !open.unit)
     parts_.judge->stops().AllStopped(open.asked, HostInstant{ReadVirtualNs()});
-  if (!open.unit) return;
-  if (open.verb != "enable" && open.verb != "disable") return;
-  if (newest_change_[open.unit->value] != client) return;
   const auto& units = parts_.judge->acknowledged().units;
-  const auto unit = units.find(open.unit->value);
-  const bool enabled = unit == units.end() || unit->second.enabled;
-  if (enabled != (open.verb == "enable"))
-    parts_.judge->Broken("reported", fmt::format("{} of unit {} is answered and not stored",
-                                                 open.verb, open.unit->value));
+  for (const std::uint32_t id : open.changes) {
+    if (newest_change_[id] != client) continue;
+    const auto unit = units.find(id);
+    const bool enabled = unit == units.end() || unit->second.enabled;
+    if (enabled != (open.verb == "enable"))
+      parts_.judge->Broken("reported",
+                           fmt::format("{} of unit {} is answered and not stored", open.verb, id));
+  }
 }
 
 }  // namespace focalfleet::soak

@@ -64,6 +64,7 @@ class Operators {
     std::string verb;
     HostInstant asked = {};
     std::optional<UnitId> unit;
+    std::vector<std::uint32_t> changes = {};  // units that it enables or disables
     bool gone = false;
   };
   bool Wants(FaultSite site, double chance);

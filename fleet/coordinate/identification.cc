@@ -231,7 +231,7 @@ void Concluded(const Coordination& fleet, PositionerIndex i) {
   }
   if (reading.not_resumed) {
     SettlePlace(fleet, i, store);
-    record.reading.stored_by = fleet.ledger.batch_now();
+    record.reading.stored_by = fleet.ledger.BatchOfEnd(record.view.serial);
     fleet.units.awaiting_store.push_back(i);
     return IdentifyWhenStored(fleet, i);
   }
@@ -292,8 +292,7 @@ HostMessage FirstQuestion() { return StepQuestion(0, false); }
 void AskNext(const Coordination& fleet, PositionerIndex i) {
   const UnitRecord& record = fleet.units[i];
   const Reading& reading = record.reading;
-  const bool resumes =
-      !fleet.ledger.intents.contains(record.view.serial) && record.trouble.not_kept.empty();
+  const bool resumes = fleet.ledger.HasEnd(record.view.serial) && record.trouble.not_kept.empty();
   if (reading.stored_by) {
     IdentifyWhenStored(fleet, i);
   } else if (reading.step < (reading.not_resumed ? kStepsOfPlace : kSteps)) {
@@ -333,7 +332,7 @@ void OnStatusRead(const Coordination& fleet, PositionerIndex i, const StatusRepl
   record.reading.status = status;
   record.reading.not_resumed =
       (status.restarted || status.host_lost) &&
-      (fleet.ledger.intents.contains(record.view.serial) || !record.trouble.not_kept.empty());
+      (!fleet.ledger.HasEnd(record.view.serial) || !record.trouble.not_kept.empty());
   ++record.reading.step;
   // A move that an earlier run staged and never started is taken back first.
   if (status.state == UnitState::kStaging || status.state == UnitState::kArmed)

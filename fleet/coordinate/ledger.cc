@@ -83,6 +83,13 @@ void Ledger::EndIntent(SerialNumber serial, IntentEnd end) {
   if (it == intents.end()) return;
   Note(IntentEndRow{it->second.serial, it->second.move, end});
   intents.erase(it);
+  ended_by_[serial] = batch_now();
+}
+
+std::uint64_t Ledger::BatchOfEnd(SerialNumber serial) const {
+  if (intents.contains(serial)) return kOpen;
+  const auto ended = ended_by_.find(serial);
+  return ended == ended_by_.end() ? 0 : ended->second;
 }
 
 void Ledger::BeginStep(std::uint64_t committed_through, bool store_failing) {

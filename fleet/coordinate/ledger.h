@@ -42,6 +42,16 @@ class Ledger {
   /// Closes the open intent of the serial number, if there is one.
   void EndIntent(SerialNumber serial, IntentEnd end);
 
+  /// The batch that has the end of the last move of the serial number; 0: none of this run. kOpen
+  /// while it has an open move.
+  static constexpr std::uint64_t kOpen = UINT64_MAX;
+  [[nodiscard]] std::uint64_t BatchOfEnd(SerialNumber serial) const;
+  /// Whether the end of its last move is stored. The next run would need the unit's own memory of a
+  /// restart until then.
+  [[nodiscard]] bool HasEnd(SerialNumber serial) const {
+    return committed_through_ >= BatchOfEnd(serial);
+  }
+
   /// The batch number that this step's rows will carry.
   [[nodiscard]] std::uint64_t batch_now() const { return next_batch_; }
   [[nodiscard]] std::uint64_t committed_through() const { return committed_through_; }
@@ -92,6 +102,7 @@ class Ledger {
   std::uint32_t moves_left_ = 0;
   std::uint64_t reserved_by_ = 0;  // the batch of the first stock
   std::deque<KeptReply> kept_replies_;
+  std::unordered_map<SerialNumber, std::uint64_t> ended_by_;  // batches
 };
 
 }  // namespace focalfleet
