@@ -101,7 +101,7 @@ TEST(Regression, Seed203409_AFoldedArmStaysAsItIsBelieved) {
   ExpectKept(203409, RunSeed(203409, 0, DrawKinds::kAll));
 }
 
-// A unit restarted in mid-move and lost its mark. It was read while the store failed, read anew and
+// A unit restarted in mid-move and lost its mark, was read while the store failed, read anew and
 // resumed; then the daemon was killed, and the next one did not know of the restart.
 TEST(Regression, Seed205393_ARestartIsNotForgottenBeforeItsEndIsStored) {
   ExpectKept(205393, RunSeed(205393, 0, DrawKinds::kAll));
