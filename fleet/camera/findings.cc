@@ -87,13 +87,15 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
 
 namespace {
 
+/// Standard deviations of the spot that may move the elbow by the clearance: one lost unit of
+/// 16,000 is taken for known too early. With two it would be one of 20; with eight, twice as large
+/// a circle around the base has to be homed.
+constexpr double kElbowSigmas = 4;
+
 /// An error of the spot turns theta, and with it the elbow: without bound where the arm is folded,
-/// by its root where the arm is stretched. Four standard deviations: one lost unit of 16,000 is
-/// taken for known too early. With two it would be one of 20; with eight, twice as large a circle
-/// around the base has to be homed.
+/// by its root where the arm is stretched.
 bool IsElbowKnown(const Unit& unit, PointFp at_fp, double sigma_mm, double clearance_mm) {
   using namespace std::complex_literals;
-  constexpr double kSigmas = 4;
   const auto elbow_at = [&unit](const AxisAngles& angles) {
     return std::polar(unit.theta().arm_mm,
                       (angles.theta_deg + unit.theta().zero_deg) * std::numbers::pi / 180);
@@ -104,7 +106,7 @@ bool IsElbowKnown(const Unit& unit, PointFp at_fp, double sigma_mm, double clear
   const std::complex<double> along = distance_mm > 0 ? from_base / distance_mm : 1.0;
   const std::vector<AxisAngles> here = AnglesFor(unit, at_fp);
   for (const std::complex<double> turn : {1.0 + 0i, -1.0 + 0i, 0.0 + 1i, 0.0 - 1i}) {
-    const std::complex<double> there = fibre + kSigmas * sigma_mm * along * turn;
+    const std::complex<double> there = fibre + kElbowSigmas * sigma_mm * along * turn;
     const auto there_fp = InReach(unit, {there.real(), there.imag()}, kStraySlackMm);
     if (!there_fp) return false;
     for (const AxisAngles& angles : here) {
@@ -143,8 +145,10 @@ std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp
 std::optional<Pose> PoseOfKnown(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
                                 const Pose& believed, const KnownSeen& with) {
   SeenWith seen_with{.sigma_mm = with.sigma_mm};
-  const auto at_fp = InReach(unit, seen_fp, kStraySlackMm);
-  if (at_fp && !IsElbowKnown(unit, *at_fp, with.sigma_mm, with.clearance_mm))
+  const double turn_rad =
+      kElbowSigmas * with.sigma_mm /
+      std::hypot(seen_fp.x_mm - unit.base_fp.x_mm, seen_fp.y_mm - unit.base_fp.y_mm);
+  if (!(turn_rad * unit.theta().arm_mm < with.clearance_mm))
     seen_with.believed_deg = BlindOf(with.was_seen).theta_sigma_deg;
   return PlaceSeen(unit, drive, seen_fp, believed, seen_with);
 }

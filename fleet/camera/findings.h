@@ -41,10 +41,11 @@ std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp
                                const UnitExpectation& expectation, double sigma_mm,
                                double clearance_mm);
 
-/// The pose of a unit of known place that is seen. Where four standard deviations of the spot may
-/// move the elbow by more than the clearance, as where the arm is folded, the angles stay as they
-/// are believed within a unit's usual errors. With a wider belief an error of 5 um at 0.14 mm from
-/// the base turns the elbow by 2 degrees. Empty: as PlaceSeen.
+/// The pose of a unit of known place that is seen. Where the fibre is so near its base that four
+/// standard deviations of the spot turn the elbow by more than the clearance, the angles stay as
+/// they are believed within a unit's usual errors. With a wider belief an error of 5 um at 0.14 mm
+/// from the base turns the elbow by 2 degrees. Elsewhere the pose is the one that puts the fibre on
+/// the spot, also where arms of other lengths than the table's do that. Empty: as PlaceSeen.
 struct KnownSeen {
   double sigma_mm = 0;
   double clearance_mm = 0;
