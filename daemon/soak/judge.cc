@@ -102,8 +102,12 @@ void Judge::Committed(std::span<const Row> rows, bool done) {
   for (const Row& row : rows)
     if (const auto* vector = std::get_if<VectorRow>(&row)) {
       const HostInstant at{ReadVirtualNs()};
-      stored_.try_emplace(vector->serial.value, Stored{at, at, kLagVectors}).first->second.last =
-          at;
+      Stored& stored =
+          stored_.try_emplace(vector->serial.value, Stored{at, at, kLagVectors}).first->second;
+      stored.last = at;
+      // A hard stop or a camera is another witness than the unit's counts.
+      if (vector->origin == Origin::kHoming || vector->knowledge[0].witness == Witness::kMeasured)
+        stored.first = Troubles::kLongAgo;
       NoteSeen(vector->serial.value, PlaceOf(*vector));
       auto& places = reported_[vector->serial.value];
       places.push_back(PlaceOf(*vector));

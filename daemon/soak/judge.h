@@ -102,7 +102,7 @@ class Judge {
   HostInstant now_{0};
   StoreJudge store_;
   struct Stored {
-    HostInstant first;
+    HostInstant first;  // of its own counts; long ago once there was another witness
     HostInstant last;
     double slack_vectors = 0;  // of its counts
   };

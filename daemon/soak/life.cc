@@ -16,8 +16,8 @@ namespace {
 
 constexpr const char* kStorePath = "store.sqlite";
 /// Looks of a search after which it counts as one without end, of 1 ms or so each. A plan takes one
-/// to two looks a unit, and up to 2200 in all where its targets are hard to come by, a third of the
-/// time that the daemon gives it.
+/// to two looks a unit, and up to 2200 in all where its targets are hard to come by. The daemon
+/// gives it 10 s; half of these looks would give up plans that it finds, twice of them cost time.
 int PlanLooksMax(std::size_t units, bool limited) {
   const int most = std::max(3000, static_cast<int>(units) * 4);
   return limited ? 10 * most : most;  // units look for a start again and again

@@ -1,8 +1,9 @@
 // The assignment of spots to units where more than one answer is possible. The claim of a unit on a
 // spot has odds against the plainest explanation: the unit is dark and the spot is dust. Claims
 // that share a unit or a spot form a group. Groups are small (a unit, a spot; rarely three or
-// four). Every assignment of a group is therefore counted with its weight, and the sums are the
-// exact probabilities of each answer. An answer that is not nearly certain is left undecided.
+// four) but where many units are lost. Every assignment of a group is therefore counted with its
+// weight, and the sums are the exact probabilities of each answer. An answer that is not nearly
+// certain is left undecided.
 #pragma once
 
 #include <cstdint>

@@ -108,11 +108,10 @@ class Matching {
     // A spot that an undecided unit could have is not assigned to another either.
     for (const Decision& decision : decisions) {
       if (decision.doubt <= options_.doubt_max) continue;
-      if (decision.spot != kNoSpot && request_.expectations[decision.unit].lost &&
-          decision.doubt <= options_.stray_doubt_max)
-        Give(decision.unit, decision.spot, MeasurementStatus::kStrayed, decision.doubt);
-      else
+      if (!request_.expectations[decision.unit].lost || decision.doubt > options_.stray_doubt_max)
         LeaveAmbiguous(decision.unit, decision.doubt);
+      else if (decision.spot != kNoSpot)
+        Give(decision.unit, decision.spot, MeasurementStatus::kStrayed, decision.doubt);
     }
     for (const Claim& claim : open) {
       const bool undecided = measurements_[claim.unit].status == MeasurementStatus::kAmbiguous;
@@ -125,8 +124,8 @@ class Matching {
 
   // A lost unit may have any spot that it reaches, also one where another unit is expected. Such
   // claims are decided together with the others where the answers can be counted. They are too many
-  // where most units are lost and reach far into each other's areas: claims on expected places are
-  // then decided by themselves. `open` becomes the claims that were decided.
+  // where many units near each other are lost and reach far into each other's areas: claims on
+  // expected places are then decided by themselves. `open` becomes the claims that were decided.
   std::vector<Decision> AssignWithLost(std::vector<Claim>* open) {
     std::vector<std::uint32_t> lost;
     for (const std::uint32_t unit : Open())

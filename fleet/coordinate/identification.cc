@@ -290,13 +290,14 @@ void OnNoSerial(const Coordination& fleet, PositionerIndex i) {
 HostMessage FirstQuestion() { return StepQuestion(0, false); }
 
 void AskNext(const Coordination& fleet, PositionerIndex i) {
-  const UnitRecord& record = fleet.units[i];
-  const Reading& reading = record.reading;
-  const bool resumes = fleet.ledger.HasEnd(record.view.serial) && record.trouble.not_kept.empty();
+  UnitRecord& record = fleet.units[i];
+  Reading& reading = record.reading;
+  // The answer is taken as what was asked for, though the store may have the end by then.
+  reading.resumes = fleet.ledger.HasEnd(record.view.serial) && record.trouble.not_kept.empty();
   if (reading.stored_by) {
     IdentifyWhenStored(fleet, i);
   } else if (reading.step < (reading.not_resumed ? kStepsOfPlace : kSteps)) {
-    fleet.requests.Ask(i, StepQuestion(reading.step, resumes));
+    fleet.requests.Ask(i, StepQuestion(reading.step, reading.resumes));
   } else {
     Concluded(fleet, i);
   }
@@ -330,9 +331,7 @@ void OnStatusRead(const Coordination& fleet, PositionerIndex i, const StatusRepl
   UnitRecord& record = fleet.units[i];
   if (record.reading.stored_by) return;
   record.reading.status = status;
-  record.reading.not_resumed =
-      (status.restarted || status.host_lost) &&
-      (!fleet.ledger.HasEnd(record.view.serial) || !record.trouble.not_kept.empty());
+  record.reading.not_resumed = (status.restarted || status.host_lost) && !record.reading.resumes;
   ++record.reading.step;
   // A move that an earlier run staged and never started is taken back first.
   if (status.state == UnitState::kStaging || status.state == UnitState::kArmed)

@@ -46,8 +46,8 @@ class Ledger {
   /// while it has an open move.
   static constexpr std::uint64_t kOpen = UINT64_MAX;
   [[nodiscard]] std::uint64_t BatchOfEnd(SerialNumber serial) const;
-  /// Whether the end of its last move is stored. The next run would need the unit's own memory of a
-  /// restart until then.
+  /// Whether the end of its last move is stored, or was set aside for good. The next run would need
+  /// the unit's own memory of a restart until then.
   [[nodiscard]] bool HasEnd(SerialNumber serial) const {
     return committed_through_ >= BatchOfEnd(serial);
   }

@@ -62,6 +62,7 @@ void Round::AddLate(PositionerIndex i, const LateMove& late, MoveId move_id) {
 void Round::DropLate(PositionerIndex i) {
   late_.erase(i.value);
   units_[i.value].plan = RoundUnit::kNoPlan;
+  units_[i.value].ended_early = true;  // it stands, whatever the plan of the round has it do
 }
 
 const LateMove* Round::LateOf(PositionerIndex i) const {

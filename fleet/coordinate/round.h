@@ -97,6 +97,7 @@ class Round {
 
   /// Gives a unit a late move, under a number of its own.
   void AddLate(PositionerIndex i, const LateMove& late, MoveId move);
+  /// Takes a late move back that has not begun: the unit stands.
   void DropLate(PositionerIndex i);
   [[nodiscard]] bool IsLate(PositionerIndex i) const { return late_.contains(i.value); }
   /// Null: none.

@@ -64,6 +64,7 @@ struct Reading {
   Pose position{};
   std::array<std::uint16_t, kAxisCount> subdivision{};
   std::array<std::int32_t, kAxisCount> counter1{};
+  bool resumes = false;  // the last question for its status resumed it
   // A unit that has restarted, or lost the host, says so until it is resumed. Where an open move
   // depends on that, it is read without being resumed first.
   bool not_resumed = false;

@@ -11,6 +11,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -70,6 +71,8 @@ struct Campaign {
   std::vector<double> cmd_deg[2];      // where the axis was commanded to go
   std::vector<double> x_mm;            // measured after the move; NaN: not seen
   std::vector<double> y_mm;
+  // The steps of x and y as measured, where places have been turned since (place_steps.h).
+  std::optional<std::array<double, 2>> steps_mm;
   std::vector<Covariate> covariates;
   std::vector<WordColumn> word_columns;
 

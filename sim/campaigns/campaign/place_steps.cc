@@ -108,6 +108,7 @@ double LastDigitOf(std::span<const double> values) {
 }
 
 PlaceSteps FindPlaceSteps(const Campaign& campaign) {
+  if (campaign.steps_mm) return {(*campaign.steps_mm)[0], (*campaign.steps_mm)[1]};
   return {FindStep(campaign.x_mm), FindStep(campaign.y_mm)};
 }
 

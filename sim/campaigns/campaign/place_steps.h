@@ -28,6 +28,7 @@ struct PlaceSteps {
   double y_mm = 0;
   [[nodiscard]] double wider_mm() const { return x_mm > y_mm ? x_mm : y_mm; }
 };
+/// Those of the places as measured.
 PlaceSteps FindPlaceSteps(const Campaign& campaign);
 
 /// Standard deviation of the rounding to a step: the error is uniform over the step.

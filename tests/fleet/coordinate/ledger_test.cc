@@ -97,5 +97,31 @@ TEST(Ledger, ConditionsOfTheHostThatAreNotFoundAgainEndAfterTheTimeOfTheConfigur
             (Ended{{"BusDown", ""}, {"DdsMissing", ""}}));
 }
 
+// A unit's own memory of a restart is needed until the store has the end of its move.
+TEST(Ledger, AMoveHasItsEndOnceThatIsCommitted) {
+  const Layout layout = OneUnit();
+  const CoordinatorConfig config;
+  StepState step;
+  StoredFleet stored;
+  const SerialNumber serial{7};
+  stored.open_intents.push_back({.serial = serial, .unit = UnitId{1}, .move = MoveId{3}});
+  Ledger ledger(layout, config, stored, step);
+  Effects effects;
+  step = {.now = HostInstant{0}, .out = &effects};
+  ledger.BeginStep(0, false);
+  EXPECT_TRUE(ledger.HasEnd(SerialNumber{8})) << "it never had a move";
+  EXPECT_FALSE(ledger.HasEnd(serial));
+  EXPECT_EQ(ledger.BatchOfEnd(serial), Ledger::kOpen);
+  ledger.EndIntent(serial, IntentEnd::kInterrupted);
+  const std::uint64_t batch = ledger.batch_now();
+  ledger.CloseBatch();
+  EXPECT_FALSE(ledger.HasEnd(serial)) << "known and not stored";
+  EXPECT_EQ(ledger.BatchOfEnd(serial), batch);
+  ledger.BeginStep(batch - 1, true);
+  EXPECT_FALSE(ledger.HasEnd(serial));
+  ledger.BeginStep(batch, false);
+  EXPECT_TRUE(ledger.HasEnd(serial));
+}
+
 }  // namespace
 }  // namespace focalfleet

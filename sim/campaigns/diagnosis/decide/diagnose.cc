@@ -148,6 +148,9 @@ std::string WhyInsufficient(const CampaignFacts& facts, const std::vector<char>&
     return "no unit was seen after " + std::to_string(kMovesMin) + " moves or more (the most is " +
            std::to_string(most) + ")";
   if (!moved) return "no axis was moved";
+  if (!facts.closed.empty() && facts.frames.size() > 1)
+    return "the loop was closed in several frames of the camera: the angles where moves began are "
+           "of different frames. Diagnose each frame by itself";
   return {};
 }
 
@@ -272,6 +275,7 @@ void DescribeRows(const RepeatedPlaces& repeated, const CampaignFacts& facts,
   diagnosis->moves = facts.exposures.size();
   Remark(RemarksOnRepeats(repeated, facts.campaign->rows()), diagnosis);
   Remark(RemarksOnOrder(facts), diagnosis);
+  diagnosis->steps = FindPlaceSteps(*facts.campaign);
 }
 
 // The steps of the places limit the diagnosis where they make more of the noise than all else does.
@@ -336,7 +340,6 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   options.progress(0, "reading the moves");
   const RepeatedPlaces repeated = ForgetRepeatedPlaces(&campaign);
   campaign.units = FindCoordinatorsGeometry(campaign);
-  diagnosis.steps = FindPlaceSteps(campaign);
   const Places as_measured{campaign.x_mm, campaign.y_mm};
   BringIntoOneFrame(options.parallel, &campaign);
   CampaignFacts facts = MakeFacts(campaign);
@@ -359,6 +362,12 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   diagnosis.causes = UndoExchanges(&campaign, &facts, &as_named);
   SetAside(RowsUnderAnothersName(facts), "at another unit's place", &aside, &diagnosis.outliers);
   Fit fit = StartFit(facts, diagnosis.model, aside, options.parallel);
+  // Geometry and many frames in turn. One round more changes places by less than their noise.
+  constexpr int kRoundsOfFrames = 2;
+  for (int round = 0; facts.frames.size() > kFramesOfFitMax && round < kRoundsOfFrames; ++round) {
+    AlignByModel(fit.model, facts, options.parallel, &campaign);
+    fit = StartFit(facts, diagnosis.model, aside, options.parallel);
+  }
   if (ShareBeyondReach(fit) > kBeyondReachMax) {
     diagnosis.insufficient =
         "the places do not belong to these units: half of them are more than 1 mm beyond the reach "
@@ -397,11 +406,11 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
   diagnosis.model = fit.model;
   diagnosis.model.frames.clear();  // the campaign's own
-  Remark(
-      RemarksOnFrames(facts.frames, Predict(diagnosis.model, facts, options.parallel), as_measured),
-      &diagnosis);
   diagnosis.model.terms.insert(diagnosis.model.terms.begin(), before.terms.begin(),
                                before.terms.end());
+  Remark(RemarksOnFrames(facts.frames, Predict(diagnosis.model, facts, options.parallel),
+                         facts.radius_mm, as_measured),
+         &diagnosis);
   LeaveOutImpossible(given, &diagnosis);
   RemarkOnNoise(fit, &diagnosis);
   options.progress(1, "done");

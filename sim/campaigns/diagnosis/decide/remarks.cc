@@ -65,8 +65,9 @@ std::vector<std::string> RemarksOnRepeats(const RepeatedPlaces& repeated, std::s
 }
 
 std::vector<std::string> RemarksOnFrames(const Frames& frames, const Places& expected,
-                                         const Places& measured) {
+                                         double radius_mm, const Places& measured) {
   constexpr std::size_t kShown = 5;
+  constexpr double kSeen_um = 1;  // less is the noise of some hundred places
   const std::vector<Similarity> found = FitFrames(frames, expected, measured);
   const auto name = [&](std::size_t k) {
     return std::isnan(frames.id[k]) ? std::string("none") : FourDigits(frames.id[k]);
@@ -75,11 +76,15 @@ std::vector<std::string> RemarksOnFrames(const Frames& frames, const Places& exp
   for (std::size_t k = 1; k < found.size() && k <= kShown; ++k) {
     const std::complex<double> factor = found[k].factor / found[0].factor;
     const double shift_um = kUmPerMm * std::abs(found[k].Of(found[0].Undone(0)));
-    remarks.push_back("in frame " + name(k) + " the camera stands otherwise than in frame " +
-                      name(0) + ": shifted by " + FourDigits(shift_um) +
-                      " um at the centre, turned by " +
-                      FourDigits(std::arg(factor) / kRadiansPerDegree) + " deg, scaled by " +
-                      FourDigits(1e6 * (std::abs(factor) - 1)) + " ppm");
+    const double edge_um = kUmPerMm * radius_mm * std::abs(factor - 1.0);
+    const std::string frames_k_and_0 = "frame " + name(k) + " and in frame " + name(0);
+    if (std::max(shift_um, edge_um) < kSeen_um)
+      remarks.push_back("the camera stands alike in " + frames_k_and_0);
+    else
+      remarks.push_back("the camera stands otherwise in " + frames_k_and_0 + ": shifted by " +
+                        FourDigits(shift_um) + " um at the centre, turned by " +
+                        FourDigits(std::arg(factor) / kRadiansPerDegree) + " deg, scaled by " +
+                        FourDigits(1e6 * (std::abs(factor) - 1)) + " ppm");
   }
   if (found.size() > kShown + 1)
     remarks.push_back("the places of " + std::to_string(found.size() - kShown - 1) +

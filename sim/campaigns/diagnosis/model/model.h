@@ -101,8 +101,8 @@ using FrameTerm = std::array<double, kExposureParameters>;
 /// A frame may stand anywhere on a bench: the spread of its prior, half and twice of which say the
 /// same as far as there are data. In um, um, urad and ppm.
 inline constexpr FrameTerm kFrameSpread = {1e4, 1e4, 1e5, 1e5};
-/// More frames than these are aligned before a fit alone. A search costs as much for a frame as for
-/// four terms.
+/// More frames than these are no unknowns of the fit, and are aligned by it in turns. A search
+/// costs as much for a frame as for four terms: half and twice of it change its time.
 inline constexpr std::size_t kFramesOfFitMax = 25;
 
 /// A step of one axis at one move that stays until the unit is homed (or for that move alone).

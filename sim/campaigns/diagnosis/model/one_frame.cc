@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "sim/campaigns/campaign/place_steps.h"
 #include "sim/campaigns/diagnosis/model/plain_geometry.h"
 
 namespace focalfleet::sim {
@@ -53,6 +54,17 @@ void BringIntoOneFrame(const ParallelFor& parallel, Campaign* campaign) {
   const std::vector<Similarity> found =
       FitFrames(frames, Predict(by_first, facts, parallel), measured);
   TakeToOne(frames, found, found[nearest], &measured);
+  const PlaceSteps steps = FindPlaceSteps(*campaign);
+  campaign->steps_mm = {steps.x_mm, steps.y_mm};
+  campaign->x_mm = std::move(measured.x_mm), campaign->y_mm = std::move(measured.y_mm);
+}
+
+void AlignByModel(const CampaignModel& model, const CampaignFacts& facts,
+                  const ParallelFor& parallel, Campaign* campaign) {
+  Places measured{std::move(campaign->x_mm), std::move(campaign->y_mm)};
+  const std::vector<Similarity> found =
+      FitFrames(facts.frames, Predict(model, facts, parallel), measured);
+  TakeToOne(facts.frames, found, found[0], &measured);
   campaign->x_mm = std::move(measured.x_mm), campaign->y_mm = std::move(measured.y_mm);
 }
 

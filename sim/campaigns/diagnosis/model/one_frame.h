@@ -10,4 +10,9 @@ namespace focalfleet::sim {
 /// alone, so that zeros need not be known. A unit with too few rows there has the table's geometry.
 void BringIntoOneFrame(const ParallelFor& parallel, Campaign* campaign);
 
+/// The same by the places of a model, to the frame with most rows. Pre: the campaign is that of the
+/// facts, and has more than one frame.
+void AlignByModel(const CampaignModel& model, const CampaignFacts& facts,
+                  const ParallelFor& parallel, Campaign* campaign);
+
 }  // namespace focalfleet::sim

@@ -13,6 +13,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+// An unknown without data or prior must not move.
+constexpr double kNoData = 1e-12;
+
 // The equations of one unit: its own unknowns (geometry, own amplitudes, homings), and the shared
 // ones that reach it.
 struct UnitEquations {
@@ -153,8 +156,7 @@ UnitSolution Eliminate(const UnitEquations& eq, SharedSystem* shared) {
   UnitSolution solution;
   MatrixXd normal = eq.own.transpose() * eq.own;
   normal.diagonal() += eq.prior;
-  // An unknown without data or prior must not move.
-  normal.diagonal().array() += 1e-12;
+  normal.diagonal().array() += kNoData;
   solution.right = eq.own.transpose() * eq.y - eq.prior.cwiseProduct(eq.value);
   solution.own.compute(normal);
   solution.cross = eq.own.transpose() * eq.shared;
@@ -246,7 +248,7 @@ void StepFit(Fit* fit) {
   if (shared_count > 0) {
     SharedSystem all{MatrixXd::Zero(shared_count, shared_count), VectorXd::Zero(shared_count)};
     for (const SharedSystem& part : parts) all.normal += part.normal, all.right += part.right;
-    all.normal.diagonal().array() += 1e-12;
+    all.normal.diagonal().array() += kNoData;
     for (const Discrepancy& of : fit->model.discrepancies)
       for (std::size_t d = 0; d < of.common.size(); ++d) {
         const Index at = shared_begin[fit->model.terms.size() + of.of] + static_cast<Index>(d);
@@ -255,8 +257,9 @@ void StepFit(Fit* fit) {
         all.right[at] -= of.common[d] * precision;
       }
     ForFrameUnknowns(&fit->model, shared_begin.back(), [&](Index at, double spread, double value) {
+      const bool is_seen = all.normal(at, at) > 2 * kNoData;  // else it stays as it is
       all.normal(at, at) += 1 / (spread * spread);
-      all.right[at] -= value / (spread * spread);
+      if (is_seen) all.right[at] -= value / (spread * spread);
     });
     const Eigen::LDLT<MatrixXd> solver(all.normal);
     shared = solver.solve(all.right);
@@ -424,7 +427,7 @@ StaticMatrix StaticCovariance(const Fit& fit, std::size_t unit) {
   const UnitEquations eq = MakeEquations(fit, unit, white, none);
   MatrixXd normal = eq.own.transpose() * eq.own;
   normal.diagonal() += eq.prior;
-  normal.diagonal().array() += 1e-12;
+  normal.diagonal().array() += kNoData;
   const Index n = normal.rows();
   return normal.ldlt().solve(MatrixXd::Identity(n, n)).topLeftCorner<6, 6>();
 }

@@ -58,15 +58,41 @@ std::vector<UnitOffset> Offsets(const Fit& fit) {
   return offsets;
 }
 
+// Whether the units' mean places are off by one shift, turn and scale more than chance makes it of
+// offsets that are each unit's own: by a test of the variance that the image explains.
+bool AreOffAlike(const Fit& fit, const std::vector<UnitOffset>& offsets) {
+  constexpr double kByChance = 0.001;  // of campaigns whose units are off each by itself
+  constexpr std::size_t kUnitsMin = 6;
+  constexpr double kImage = 4;  // real parameters
+  if (offsets.size() < kUnitsMin) return false;
+  const auto units = static_cast<Index>(offsets.size());
+  Eigen::VectorXcd moved(units);
+  Eigen::MatrixXcd image(units, 2);
+  for (Index k = 0; k < units; ++k) {
+    const UnitOffset& one = offsets[static_cast<std::size_t>(k)];
+    const CampaignUnit& unit = fit.model.units[one.unit];
+    const VectorXd moved_um = GeometryDisplacements(Whiten(fit, one.unit)) * one.offset;
+    const Eigen::Map<const Eigen::Matrix2Xd> places(moved_um.data(), 2, moved_um.size() / 2);
+    const Eigen::Vector2d mean = places.rowwise().mean();
+    moved[k] = {mean[0], mean[1]};
+    image.row(k) << 1.0, std::complex<double>(unit.base_x_mm, unit.base_y_mm);
+  }
+  const double all = moved.squaredNorm();
+  const double own = (moved - image * image.colPivHouseholderQr().solve(moved)).squaredNorm();
+  const double freedom = 2 * static_cast<double>(units) - kImage;
+  return LogChiSquareTail((all - own) / (own / freedom), kImage) < std::log(kByChance);
+}
+
 // Where the image moves, what the offsets of all units do alike in an exposure is the image's
 // motion as well: no table has its place. Offsets are judged without it, as if by the marginal
 // likelihood of both, in which the motions of exposures do not depend on one another. Where the
-// camera has several frames, the same holds of all exposures together: no frame is the table's.
+// camera has several frames, and the units are off alike, the same holds of all exposures together:
+// no frame is the table's.
 void TakeOffTheImage(const Fit& fit, std::vector<UnitOffset>* offsets) {
   using ImageNormal = Eigen::Matrix<double, kExposureParameters, kExposureParameters>;
   using ImageVector = Eigen::Matrix<double, kExposureParameters, 1>;
   const std::vector<ExposureTerm>& exposures = fit.model.exposures;
-  const bool has_frames = fit.facts->frames.size() > 1;
+  const bool has_frames = fit.facts->frames.size() > 1 && AreOffAlike(fit, *offsets);
   if (!has_frames && std::ranges::none_of(exposures, &ExposureTerm::moves)) return;
   // An image of each exposure, and one that all others have together.
   const std::size_t together = exposures.size();

@@ -169,6 +169,9 @@ Motion FindMotion(const Fit& fit) {
     motion.left += images[e].square - motion.found[e].dot(images[e].right.head<4>());
     motion.left_dof += 2 * images[e].rows - 4;
   }
+  // Frames have taken as much of the motion.
+  if (!fit.model.frames.empty())
+    motion.dof -= kExposureParameters * static_cast<double>(fit.model.frames.size() - 1);
   if (motion.left_dof > 0) motion.noise *= motion.left / motion.left_dof;
   return motion;
 }
