@@ -24,6 +24,14 @@ Function AnswerFunction(const CanFrame& question) {
 
 }  // namespace
 
+std::uint8_t SequenceBeforeRun(MoveId next_move) {
+  // Without a divisor in common with all numbers: runs come round after as many of them. A run's
+  // first hundred questions to a unit are not those of the next run.
+  constexpr std::uint32_t kApart = 101;
+  return static_cast<std::uint8_t>(next_move.value / limits::kMovesReserved * kApart %
+                                   kLastSequence);
+}
+
 Requests::Requests(const CoordinatorConfig& config, const StepState& step, UnitTable* units,
                    UnitTimers* timers)
     : config_(config),
@@ -33,7 +41,7 @@ Requests::Requests(const CoordinatorConfig& config, const StepState& step, UnitT
       timers_(*timers) {}
 
 std::uint8_t Requests::SequenceAfter(PositionerIndex i, int questions) const {
-  const int last = units_[i].request.sequence;  // 0: none was asked yet
+  const int last = units_[i].request.sequence;
   return static_cast<std::uint8_t>((last + questions - 1) % kLastSequence + 1);
 }
 

@@ -16,6 +16,12 @@
 
 namespace focalfleet {
 
+/// The sequence number before the first question of a run. An answer to the run before may be held
+/// up on its way, and must answer nothing of this one: it would give a place or a clock of earlier.
+/// Each run that has stored anything has taken a block of move numbers, and so does not begin as
+/// the one before it did. `next_move`: as stored.
+[[nodiscard]] std::uint8_t SequenceBeforeRun(MoveId next_move);
+
 class Requests {
  public:
   /// All arguments outlive this.

@@ -44,7 +44,7 @@ struct ParameterOrder {
 
 /// State of the questions to one unit (requests.h).
 struct RequestState {
-  std::uint8_t sequence = 0;  // of the last question; 0: none yet
+  std::uint8_t sequence = 0;  // of the last question
   std::optional<Question> question;
   HostInstant answered_asked{INT64_MIN};  // when the question answered last was asked
   std::uint64_t write_request = 0;  // the command that waits for the answer to a written parameter

@@ -107,6 +107,11 @@ TEST(Regression, Seed205393_ARestartIsNotForgottenBeforeItsEndIsStored) {
   ExpectKept(205393, RunSeed(205393, 0, DrawKinds::kAll));
 }
 
+// A clock's answer to the life before, held up on its bus, answered this life's first question.
+TEST(Regression, Seed208257_AnAnswerToTheLifeBeforeIsNone) {
+  ExpectKept(208257, RunSeed(208257, 0, DrawKinds::kAll));
+}
+
 // The judge's own parts must be able to see what they look for.
 
 StoreOptions On(const MemoryDisk& disk) { return {.vfs = disk.name(), .vfs_has_files = true}; }
