@@ -362,7 +362,8 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   diagnosis.causes = UndoExchanges(&campaign, &facts, &as_named);
   SetAside(RowsUnderAnothersName(facts), "at another unit's place", &aside, &diagnosis.outliers);
   Fit fit = StartFit(facts, diagnosis.model, aside, options.parallel);
-  // Geometry and many frames in turn. One round more changes places by less than their noise.
+  // Geometry and many frames are found in turn. A third round changes places by less than their
+  // noise.
   constexpr int kRoundsOfFrames = 2;
   for (int round = 0; facts.frames.size() > kFramesOfFitMax && round < kRoundsOfFrames; ++round) {
     AlignByModel(fit.model, facts, options.parallel, &campaign);
