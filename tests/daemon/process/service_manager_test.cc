@@ -51,8 +51,9 @@ class ServiceManagerTest : public FocalfleetdTest {
   /// Stops the thread until the manager hears of the trouble. A thread that was stopped within a
   /// commit counts as waiting for the disk, so that it is let go and stopped anew.
   [[nodiscard]] bool Hang(pid_t thread, const std::string& trouble) const {
-    constexpr int kTries = 3;
+    constexpr int kTries = 3, kCommitEndsMs = 1000;
     for (int i = 0; i < kTries; ++i) {
+      test::Pause(kCommitEndsMs);
       if (ptrace(PTRACE_SEIZE, thread, nullptr, nullptr) != 0) return false;
       if (ptrace(PTRACE_INTERRUPT, thread, nullptr, nullptr) != 0) return false;
       if (manager_.NextWith(trouble)) return true;
