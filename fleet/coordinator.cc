@@ -25,7 +25,7 @@ class Coordinator::Impl {
                step_),
         timers_(layout->size()),
         ledger_(*layout, config_, std::move(stored), step_),
-        requests_(config_, step_, &units_, &timers_),
+        requests_(config_, step_, &units_, &timers_, ledger_.next_move()),
         traffic_(config_, step_, &units_),
         fleet_{*layout, config_, step_, units_, timers_, requests_, ledger_},
         sessions_(fleet_),

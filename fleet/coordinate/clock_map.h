@@ -7,9 +7,9 @@
 //              request is on the bus later, and the unit reads its counter later still. A request
 //              that is repeated keeps its sequence number. `earliest` is of the first copy, and
 //              copies that a fault of the bus makes come later, too. Answers to earlier requests
-//              have other numbers, also those of the run before. These come round after 254
-//              requests: an answer that old would have to be overtaken by all later ones. An answer
-//              to a request that has not left answers none. Requests never travel in groups;
+//              have other numbers, and those of a run that was killed young. These come round after
+//              254 requests: an answer that old would have to be overtaken by all later ones. An
+//              answer to a request that has not left answers none. Requests never travel in groups;
 //              staging frames alone do.
 //   latest     a time read after the answer had been, or the kernel's stamp where that is sound
 //              (FrameStamps). The unit read its counter before it answered. Among several copies of

@@ -61,6 +61,7 @@ class Ledger {
   /// as used. A run that is killed may leave armed units behind that do not answer, and the start
   /// signals of the next run reach them. Pre: MovesAreReserved().
   MoveId TakeMoveId();
+  [[nodiscard]] MoveId next_move() const { return next_move_; }
   [[nodiscard]] bool MovesAreReserved() const { return committed_through_ >= reserved_by_; }
   std::uint64_t TakeConfigurationId() { return next_configuration_++; }
   /// The intent was made since this daemon started.

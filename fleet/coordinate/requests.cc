@@ -25,20 +25,24 @@ Function AnswerFunction(const CanFrame& question) {
 }  // namespace
 
 std::uint8_t SequenceBeforeRun(MoveId next_move) {
-  // Without a divisor in common with all numbers: runs come round after as many of them. A run's
-  // first hundred questions to a unit are not those of the next run.
-  constexpr std::uint32_t kApart = 101;
+  // Without a divisor in common with 254, so that the 64 blocks begin apart, and the first one 113
+  // numbers from the last. With 101 these two are 13 apart; with half or twice of 99 runs are 49 or
+  // 56 apart. A run asks each unit 7 questions at its start, and one every 10 s at rest.
+  constexpr std::uint32_t kApart = 99;
   return static_cast<std::uint8_t>(next_move.value / limits::kMovesReserved * kApart %
                                    kLastSequence);
 }
 
 Requests::Requests(const CoordinatorConfig& config, const StepState& step, UnitTable* units,
-                   UnitTimers* timers)
+                   UnitTimers* timers, MoveId next_move)
     : config_(config),
       rates_{config.bit_rate_bps, config.data_bit_rate_bps},
       step_(step),
       units_(*units),
-      timers_(*timers) {}
+      timers_(*timers) {
+  for (std::uint32_t n = 0; n < units_.size(); ++n)
+    units_[{n}].request.sequence = SequenceBeforeRun(next_move);
+}
 
 std::uint8_t Requests::SequenceAfter(PositionerIndex i, int questions) const {
   const int last = units_[i].request.sequence;

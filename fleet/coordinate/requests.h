@@ -17,16 +17,18 @@
 namespace focalfleet {
 
 /// The sequence number before the first question of a run. An answer to the run before may be held
-/// up on its way, and must answer nothing of this one: it would give a place or a clock of earlier.
-/// Each run that has stored anything has taken a block of move numbers, and so does not begin as
-/// the one before it did. `next_move`: as stored.
+/// up on its way, and should answer nothing of this one: it would give a place or a clock of
+/// earlier. Each run that has stored anything has taken a block of move numbers, and begins 99
+/// numbers behind the one before it: a run that was killed young has no number in common with the
+/// next one. An answer to a long run may have any, and meets an open question by chance, once in
+/// 254. `next_move`: as stored.
 [[nodiscard]] std::uint8_t SequenceBeforeRun(MoveId next_move);
 
 class Requests {
  public:
-  /// All arguments outlive this.
+  /// All arguments but `next_move` outlive this. `next_move`: as stored before this run.
   Requests(const CoordinatorConfig& config, const StepState& step, UnitTable* units,
-           UnitTimers* timers);
+           UnitTimers* timers, MoveId next_move);
 
   /// Replaces any open question. Where the bus's queue is full the question is asked when it has
   /// room. `answer_bits`: length of the answer, where that is known; 0: a fair guess.

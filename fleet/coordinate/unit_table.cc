@@ -4,7 +4,6 @@
 #include <string>
 #include <utility>
 
-#include "fleet/coordinate/requests.h"
 #include "protocol/base/check.h"
 
 namespace focalfleet {
@@ -35,7 +34,6 @@ UnitTable::UnitTable(const Layout& layout_in, std::vector<UnitDrive> drives_in,
   for (std::uint32_t n = 0; n < units_.size(); ++n) {
     const Unit& unit = layout.units()[n];
     units_[n].view.enabled = unit.enabled;
-    units_[n].request.sequence = SequenceBeforeRun(stored.next_move);
     if (!unit.enabled) units_[n].view.disabled_reason = "disabled in the units file";
     BusRecord* bus = FindBus(unit.bus);
     units_[n].bus = static_cast<std::size_t>(bus - buses.data());

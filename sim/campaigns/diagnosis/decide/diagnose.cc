@@ -409,9 +409,9 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   diagnosis.model.frames.clear();  // the campaign's own
   diagnosis.model.terms.insert(diagnosis.model.terms.begin(), before.terms.begin(),
                                before.terms.end());
-  Remark(RemarksOnFrames(facts.frames, Predict(diagnosis.model, facts, options.parallel),
-                         facts.radius_mm, as_measured),
-         &diagnosis);
+  Remark(
+      RemarksOnFrames(facts.frames, Predict(diagnosis.model, facts, options.parallel), as_measured),
+      &diagnosis);
   LeaveOutImpossible(given, &diagnosis);
   RemarkOnNoise(fit, &diagnosis);
   options.progress(1, "done");

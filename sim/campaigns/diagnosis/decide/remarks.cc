@@ -3,8 +3,13 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <complex>
+#include <numbers>
+#include <utility>
 
 #include "protocol/base/units.h"
+#include "sim/campaigns/diagnosis/model/chances.h"
+#include "sim/campaigns/diagnosis/model/model.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -24,6 +29,39 @@ bool Joins(const Campaign& campaign, std::size_t row) {
     if (std::abs(std::remainder(gap_deg, kTurnDeg)) > kJoins_deg) return false;
   }
   return true;
+}
+
+// How far the places of a frame are from where its image puts them, and how far that image is from
+// the first frame's, there.
+struct FrameScatter {
+  std::vector<double> off_mm;
+  double moved_mm2 = 0;  // summed over the places
+  void Add(const Similarity& first, const Similarity& own, std::complex<double> expected,
+           std::complex<double> measured) {
+    off_mm.push_back(std::abs(measured - own.Of(expected)));
+    moved_mm2 += std::norm(own.Of(expected) - first.Of(expected));
+  }
+};
+
+// Whether two frames differ by more than the noise of their places. The squared motion, averaged
+// over the places, is then that of four parameters. Those that make the sum of distances least have
+// 4/pi of the variance of least squares (Brown, J. R. Stat. Soc. B 45, 25: the spatial median). The
+// variance itself is by the median of the squared distances, which for two normal coordinates knows
+// it as well as ln^2 2 of the places do by their mean.
+bool StandOtherwise(const FrameScatter& first, const FrameScatter& frame) {
+  constexpr double kByChance = 0.001;  // of frames in which the camera stands alike
+  constexpr double kLn2 = std::numbers::ln2;
+  const auto rows = static_cast<double>(frame.off_mm.size());
+  const auto of_first = static_cast<double>(first.off_mm.size());
+  std::vector<double> off_mm = first.off_mm;
+  off_mm.insert(off_mm.end(), frame.off_mm.begin(), frame.off_mm.end());
+  const double values = 2 * (rows + of_first), freedom = values - 2 * kExposureParameters;
+  const double a = kLn2 * kLn2 * freedom / 2;
+  if (!(a > 0)) return false;
+  const double variance_mm2 = std::pow(Median(std::move(off_mm)), 2) / (2 * kLn2) * values /
+                              freedom * 4 / std::numbers::pi * (1 / rows + 1 / of_first);
+  const double left = 1 / (1 + frame.moved_mm2 / rows / variance_mm2 / (2 * a));
+  return TailOfFourParameters(left, a) < kByChance;
 }
 
 }  // namespace
@@ -65,26 +103,33 @@ std::vector<std::string> RemarksOnRepeats(const RepeatedPlaces& repeated, std::s
 }
 
 std::vector<std::string> RemarksOnFrames(const Frames& frames, const Places& expected,
-                                         double radius_mm, const Places& measured) {
-  constexpr std::size_t kShown = 5;
-  constexpr double kSeen_um = 1;  // less is the noise of some hundred places
+                                         const Places& measured) {
+  constexpr std::size_t kShown = 5;  // the others are counted
   const std::vector<Similarity> found = FitFrames(frames, expected, measured);
+  std::vector<FrameScatter> scatter(found.size());
+  for (std::size_t row = 0; row < frames.of_row.size(); ++row)
+    if (std::isfinite(measured.x_mm[row]) && std::isfinite(expected.x_mm[row]))
+      scatter[frames.of_row[row]].Add(found[0], found[frames.of_row[row]],
+                                      {expected.x_mm[row], expected.y_mm[row]},
+                                      {measured.x_mm[row], measured.y_mm[row]});
   const auto name = [&](std::size_t k) {
     return std::isnan(frames.id[k]) ? std::string("none") : FourDigits(frames.id[k]);
   };
   std::vector<std::string> remarks;
   for (std::size_t k = 1; k < found.size() && k <= kShown; ++k) {
-    const std::complex<double> factor = found[k].factor / found[0].factor;
-    const double shift_um = kUmPerMm * std::abs(found[k].Of(found[0].Undone(0)));
-    const double edge_um = kUmPerMm * radius_mm * std::abs(factor - 1.0);
-    const std::string frames_k_and_0 = "frame " + name(k) + " and in frame " + name(0);
-    if (std::max(shift_um, edge_um) < kSeen_um)
-      remarks.push_back("the camera stands alike in " + frames_k_and_0);
-    else
-      remarks.push_back("the camera stands otherwise in " + frames_k_and_0 + ": shifted by " +
+    const std::string both = "frame " + name(k) + " and in frame " + name(0);
+    if (scatter[k].off_mm.empty()) {
+      remarks.push_back("no place was seen in frame " + name(k));
+    } else if (!StandOtherwise(scatter[0], scatter[k])) {
+      remarks.push_back("the camera stands alike in " + both + ", as far as these places show it");
+    } else {
+      const std::complex<double> factor = found[k].factor / found[0].factor;
+      const double shift_um = kUmPerMm * std::abs(found[k].Of(found[0].Undone(0)));
+      remarks.push_back("the camera stands otherwise in " + both + ": shifted by " +
                         FourDigits(shift_um) + " um at the centre, turned by " +
                         FourDigits(std::arg(factor) / kRadiansPerDegree) + " deg, scaled by " +
                         FourDigits(1e6 * (std::abs(factor) - 1)) + " ppm");
+    }
   }
   if (found.size() > kShown + 1)
     remarks.push_back("the places of " + std::to_string(found.size() - kShown - 1) +

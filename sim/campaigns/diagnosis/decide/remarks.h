@@ -20,7 +20,7 @@ std::vector<std::string> RemarksOnRepeats(const RepeatedPlaces& repeated, std::s
 /// How the camera stood in the first few frames, against the frame with most rows. `expected`: the
 /// places by the model, all in one frame.
 std::vector<std::string> RemarksOnFrames(const Frames& frames, const Places& expected,
-                                         double radius_mm, const Places& measured);
+                                         const Places& measured);
 
 std::string RemarkOnSteps(const PlaceSteps& steps);
 

@@ -87,4 +87,8 @@ double MiddleOf(std::vector<double> values) {
   return (*std::max_element(values.begin(), upper) + *upper) / 2;
 }
 
+double TailOfFourParameters(double left, double a) {
+  return std::pow(left, a) * (1 + a * (1 - left));
+}
+
 }  // namespace focalfleet::sim

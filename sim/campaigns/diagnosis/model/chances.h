@@ -26,6 +26,10 @@ inline double MinusLogDensity(double square) {
 /// ln P(chi-square of `dof` degrees of freedom > x). 0 for x <= 0. Pre: dof > 0.
 double LogChiSquareTail(double x, double dof);
 
+/// Chance of Fisher's F where four parameters leave no more than the share `left` of the squares,
+/// with 2 a degrees of freedom left: x^a (1 + a (1 - x)). Exact. Pre: 0 <= left <= 1, a > 0.
+double TailOfFourParameters(double left, double a);
+
 /// ln of the probability that the least of `tests` independent p-values is below exp(log_p).
 double LogLeastOf(double log_p, double tests);
 

@@ -59,13 +59,13 @@ std::vector<UnitOffset> Offsets(const Fit& fit) {
 }
 
 // Whether the units' mean places are off by one shift, turn and scale more than chance makes it of
-// offsets that are each unit's own: by a test of the variance that the image explains.
+// offsets that are each unit's own: Fisher's test of the variance that the image explains.
 bool AreOffAlike(const Fit& fit, const std::vector<UnitOffset>& offsets) {
   constexpr double kByChance = 0.001;  // of campaigns whose units are off each by itself
-  constexpr std::size_t kUnitsMin = 6;
-  constexpr double kImage = 4;  // real parameters
-  if (offsets.size() < kUnitsMin) return false;
+  static_assert(kExposureParameters == 4);
   const auto units = static_cast<Index>(offsets.size());
+  const double a = static_cast<double>(units) - 2;  // half of 2 coordinates a unit less 4
+  if (!(a > 0)) return false;
   Eigen::VectorXcd moved(units);
   Eigen::MatrixXcd image(units, 2);
   for (Index k = 0; k < units; ++k) {
@@ -78,9 +78,10 @@ bool AreOffAlike(const Fit& fit, const std::vector<UnitOffset>& offsets) {
     image.row(k) << 1.0, std::complex<double>(unit.base_x_mm, unit.base_y_mm);
   }
   const double all = moved.squaredNorm();
-  const double own = (moved - image * image.colPivHouseholderQr().solve(moved)).squaredNorm();
-  const double freedom = 2 * static_cast<double>(units) - kImage;
-  return LogChiSquareTail((all - own) / (own / freedom), kImage) < std::log(kByChance);
+  if (!(all > 0)) return false;
+  const double left =
+      (moved - image * image.colPivHouseholderQr().solve(moved)).squaredNorm() / all;
+  return TailOfFourParameters(left, a) < kByChance;
 }
 
 // Where the image moves, what the offsets of all units do alike in an exposure is the image's

@@ -8,6 +8,7 @@
 
 #include "tests/sim/campaigns/campaign/odd_places.h"
 #include "tests/sim/campaigns/planting/planted_campaign.h"
+#include "tests/support/seed.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -142,6 +143,32 @@ TEST(Remarks, ShortenLongLists) {
   EXPECT_EQ(FirstOf(std::vector<int>{1, 2, 3, 4, 5}), "1, 2, 3, 4, 5");
   EXPECT_EQ(FirstOf(std::vector<int>{1, 2, 3, 4, 5, 6, 7}), "1, 2, 3, 4, 5 and 2 more");
   EXPECT_THAT(RemarkOnSteps({0.1, 0.05}), HasSubstr("0.1 mm in x and 0.05 mm in y"));
+}
+
+TEST(Remarks, FramesDifferByChanceAsSeldomAsStated) {
+  constexpr int kDraws = 4000, kPlaces = 90;
+  constexpr double kStated = 0.001, kNoise_mm = 0.005;
+  const std::uint64_t seed = focalfleet::test::TestSeed(1);
+  FOCALFLEET_TRACE_SEED(seed);
+  Rng rng = Rng::Stream(seed, "frames");
+  int otherwise = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    Frames frames{.id = {1, 2}, .of_row = {}};
+    Places expected, measured;
+    for (std::uint32_t row = 0; row < kPlaces; ++row) {
+      frames.of_row.push_back(row % 3 == 0 ? 1 : 0);
+      for (std::vector<double> Places::*const xy : {&Places::x_mm, &Places::y_mm}) {
+        (expected.*xy).push_back(rng.Uniform(-100, 100));
+        (measured.*xy).push_back((expected.*xy).back() + kNoise_mm * rng.Normal());
+      }
+    }
+    const auto remarks = RemarksOnFrames(frames, expected, measured);
+    ASSERT_EQ(remarks.size(), 1u);
+    if (remarks[0].find("otherwise") != std::string::npos) ++otherwise;
+  }
+  // Four are expected; chance makes more than twelve once in 5000 times.
+  EXPECT_LE(otherwise, 3 * kStated * kDraws);
+  EXPECT_GT(otherwise, 0) << "the test would never say so";
 }
 
 }  // namespace
